@@ -2,14 +2,14 @@
 // the set is in the way, the fog is dark: shafts of light stand between the shadows.
 
 // The fog's density at a distance along a ray.
-INLINE real fog_density_at(vec origin, vec direction, real t, __constant const struct Material *m) {
+INLINE real fog_density_at(vec origin, vec direction, real t, material_record m) {
     if (m->fog_height <= S(0.0)) return (real)(m->fog_density);
     const real level = fog_level(origin, m) + t * fog_level(direction, m) - (real)(m->fog_base);
     return (real)(m->fog_density) * exp(fmin(-level / (real)(m->fog_height), FOG_THICKEST));
 }
 
 // How far along a ray the optical depth is reached.
-INLINE real fog_way(vec origin, vec direction, real depth, __constant const struct Material *m) {
+INLINE real fog_way(vec origin, vec direction, real depth, material_record m) {
     const real even = depth / fog_density_at(origin, direction, R(0.0), m);
     if (m->fog_height <= S(0.0)) return even;
     const real bend = fog_level(direction, m) / (real)(m->fog_height), c = even * bend;
@@ -27,8 +27,7 @@ typedef struct {
 
 // The place of a light's sample on the way of a ray of length `far`: by what comes through where the light is as strong everywhere, and
 // by the angle at a lamp (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
-INLINE real scattering_place(ray r, real far, real u, __constant const struct Light *light, __constant const struct Material *m,
-                             real *weight) {
+INLINE real scattering_place(ray r, real far, real u, light_record light, material_record m, real *weight) {
     if (light->kind == LIGHT_DIRECTIONAL || (!light_is_seen(light) && !light->inverse_square)) {
         const real depth = pick(less(far, R(1e30)), fog_depth(r.origin, r.direction, fmin(far, R(1e30)), m),
                                 -log(fmax(fog_passes_all(r.origin, r.direction, m), R(1e-30))));
@@ -50,7 +49,7 @@ INLINE real scattering_place(ray r, real far, real u, __constant const struct Li
 
 // What the fog sends to the eye of a light, if nothing is between.
 INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, int light_index, world w) {
-    __constant const struct Light *light = w.lights + light_index;
+    light_record light = w.lights + light_index;
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, (uint)(PURPOSE_AIR + 16 * (1 + light_index)));
     real u, v, weight;
     unit_square((bits)((uint)s.sample), seed, &u, &v);
@@ -76,30 +75,4 @@ INLINE real way_in_fog(stage s, ray r, const spot *here, world w) {
     real density = R(0.0), weight = R(0.0);
     nearest_light(&r.origin, &r.direction, 1, &far, &shows, &density, &weight, w);
     return far;
-}
-
-// Sends a ray for each light, in the turns from `first` on.
-INLINE void air_send(stage s, const packet_pixels *at, aim a, const spot *here, int first, world w) {
-    const ray r = eye_ray(&a, w.view);
-    const real far = way_in_fog(s, r, here, w);
-    for (int i = 0; i < w.settings->light_count; ++i) {
-        const scattering from = scattered(s, at, r, far, i, w);
-        ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
-                    (r.footprint + r.spread * from.t) * (real)(w.settings->shadow_detail), R(0.0), RAY_NOTHING_KNOWN};
-        const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? less(R(0.0), R(1.0)) : less(R(1.0), R(0.0)));
-        send_clipped(s, first + i, asks, R(0.0), WHETHER, wanted, w);
-    }
-}
-
-// Adds what these rays bring, and keeps it to the end of the shot.
-INLINE void air_gather(stage s, const packet_pixels *at, aim a, const spot *here, int first, tally *cost, world w) {
-    const ray r = eye_ray(&a, w.view);
-    const real far = way_in_fog(s, r, here, w);
-    color air = color_of(R(0.0), R(0.0), R(0.0));
-    for (int i = 0; i < w.settings->light_count; ++i) {
-        const encounter met = queue_met(s.q, first + i, s.slot);
-        tally_met(cost, met, 0);
-        air = color_pick(mask_of(met.hit), air, color_add(air, scattered(s, at, r, far, i, w).light));
-    }
-    STATE_KEEP(s, air, STATE_AIR);
 }

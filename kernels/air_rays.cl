@@ -11,23 +11,36 @@
 
 // Sends a ray for each light, in the turns from `next_turns` on.
 STAGE(send_air) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const spot found = spot_kept(s, 0);
-    air_send(s, &here.at, aim_kept(s), &found, next_turns, w);
+    const aim a = aim_kept(s);
+    const ray r = eye_ray(&a, w.view);
+    const real far = way_in_fog(s, r, &found, w);
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        const scattering from = scattered(s, &here.at, r, far, i, w);
+        const ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
+                          (r.footprint + r.spread * from.t) * (real)(w.settings->shadow_detail), R(0.0), RAY_NOTHING_KNOWN};
+        const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? less(R(0.0), R(1.0)) : less(R(1.0), R(0.0)));
+        send_clipped(s, next_turns + i, asks, R(0.0), WHETHER, wanted, w);
+    }
 }
 
 // Keeps what these rays bring to the end of the shot.
 STAGE(gather_air) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const spot found = spot_kept(s, 0);
-    tally cost;
-    STATE_RECALL(s, cost, STATE_TALLY);
-    air_gather(s, &here.at, aim_kept(s), &found, next_turns, &cost, w);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    const aim a = aim_kept(s);
+    const ray r = eye_ray(&a, w.view);
+    const real far = way_in_fog(s, r, &found, w);
+    color air = color_of(R(0.0), R(0.0), R(0.0));
+    for (int i = 0; i < w.settings->light_count; ++i) {
+        const encounter met = queue_met(s.q, next_turns + i, s.slot);
+        tally_met(&cost, met, 0);
+        air = color_pick(mask_of(met.hit), air, color_add(air, scattered(s, &here.at, r, far, i, w).light));
+    }
+    STATE_KEEP(s, air, STATE_AIR);
     STATE_KEEP(s, cost, STATE_TALLY);
 }

@@ -28,8 +28,7 @@ CALLED albedo albedo_at(__global const float *table, real cosine, real roughness
         found[lane] = mix(mix((scalar)low[i], (scalar)low[i + 1], across), mix((scalar)high[i], (scalar)high[i + 1], across), down);
         means[lane] = mix((scalar)low[ALBEDO_COSINES], (scalar)high[ALBEDO_COSINES], down);
     }
-    const albedo a = {lanes_load(found), lanes_load(means)};
-    return a;
+    return (albedo){lanes_load(found), lanes_load(means)};
 }
 
 // From tables for square roots of the reflectance at normal incidence, the first of which is given.
@@ -71,7 +70,6 @@ typedef struct {
 INLINE repeated repeated_at(__global const float *tables, real cosine, real roughness) {
     albedo found[REPEATED_TABLES];
     for (int i = 0; i < REPEATED_TABLES; ++i) found[i] = albedo_at(tables + i * ALBEDO_TABLE, cosine, roughness);
-    const repeated r = {found[0].of_direction, found[1].of_direction, {found[2].of_direction, found[3].of_direction},
+    return (repeated){found[0].of_direction, found[1].of_direction, {found[2].of_direction, found[3].of_direction},
                         {found[2].mean, found[3].mean}};
-    return r;
 }

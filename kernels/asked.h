@@ -3,8 +3,7 @@
 
 // The mean curvature, half the divergence of the normals, above 0 where the set bulges: by differences over `coloring_step`, on the
 // surface of equal distance that lies so far above it, since below it there may be no gradient. A sphere's is then corrected exactly.
-INLINE real mean_curvature(vec point, vec normal, mask active, __constant const struct Material *m, __constant const struct Orbit *orbit,
-                           __constant const scalar *k) {
+INLINE real mean_curvature(vec point, vec normal, mask active, material_record m, orbit_record orbit, constants k) {
     const real step = (real)(m->coloring_step);
     const vec above = vec_along(point, step, normal);
     vec side, up;
@@ -23,8 +22,7 @@ INLINE real mean_curvature(vec point, vec normal, mask active, __constant const 
     return mean / fmax(R(1.0) - mean * step, R(0.1));
 }
 
-INLINE real asked_quantity(const spot *here, mask active, __constant const struct Material *m, __constant const struct Orbit *orbit,
-                           __constant const scalar *k) {
+INLINE real asked_quantity(const spot *here, mask active, material_record m, orbit_record orbit, constants k) {
     if (m->asks == MAP_CURVATURE) return mean_curvature(here->point, here->normal, active, m, orbit, k);
     if (m->asks == MAP_THICKNESS) return set_thickness(here->point, vec_scale(here->normal, R(-1.0)), here->cone, active, m, orbit, k);
     if (m->asks == MAP_LAYER_DISTANCE) return layer_distance(here->point, here->normal, active, m, orbit, k);

@@ -14,22 +14,18 @@ typedef struct {
 
 // The ray through the picture at (x, y), in pixels from the top left corner, and through the lens at (lens_x, lens_y), in
 // lens radii from its middle; `time` is when the shutter lets it in (see view.h).
-INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, __constant const struct View *view) {
+INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, view_record view) {
     const real across = x - (real)(view->center_x);
     const real below = y - (real)(view->center_y);
     const vec on_plane = vec_along(vec_along(VIEW_VEC(view, center, time), across, VIEW_VEC(view, right, time)), below,
                                    VIEW_VEC(view, down, time));
-    ray r;
-    r.near = R(0.0);
-    r.far = (real)(REAL_LARGEST);
-    r.known = RAY_NOTHING_KNOWN;
+    ray r = {.far = (real)(REAL_LARGEST), .known = RAY_NOTHING_KNOWN};
     if (view->perspective) {
         // Relative to the eye, so that a far-off camera loses no more digits than it must.
         r.origin = VIEW_VEC(view, eye, time);
         const vec from_eye = vec_sub(on_plane, r.origin);
         const real inverse = R(1.0) / sqrt(vec_dot(from_eye, from_eye));
         r.direction = vec_scale(from_eye, inverse);
-        r.footprint = R(0.0);
         r.spread = VIEW_NUMBER(view, pixel_size, time) * inverse;
         if (!view->has_lens) return r;
         // A thin lens: whatever its point, all rays of a pixel meet again in the plane of focus.
@@ -43,7 +39,6 @@ INLINE ray camera_ray(real x, real y, real lens_x, real lens_y, real time, __con
         r.origin = on_plane;
         r.direction = VIEW_VEC(view, axis, time);
         r.footprint = VIEW_NUMBER(view, pixel_size, time);
-        r.spread = R(0.0);
     }
     return r;
 }
@@ -62,6 +57,6 @@ INLINE mask ray_clip(ray *r, __constant const scalar *center, real radius) {
 }
 
 // How far a point lies from the eye along the view's axis.
-INLINE real depth_of(vec point, real time, __constant const struct View *view) {
+INLINE real depth_of(vec point, real time, view_record view) {
     return vec_dot(vec_sub(point, VIEW_VEC(view, eye, time)), VIEW_VEC(view, axis, time));
 }

@@ -3,10 +3,7 @@ typedef struct {
     real r, g, b;
 } color;
 
-INLINE color color_of(real r, real g, real b) {
-    const color c = {r, g, b};
-    return c;
-}
+INLINE color color_of(real r, real g, real b) { return (color){r, g, b}; }
 #define color_splat(c) color_of((real)((c)[0]), (real)((c)[1]), (real)((c)[2]))  // of a struct in any memory
 INLINE color color_pick(mask m, color yes, color no) {
     return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));

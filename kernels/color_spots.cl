@@ -1,31 +1,17 @@
 // Entry point that knows the formula: what chooses the colour of spots, where that asks the formula.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
-#include "camera.h"
-#include "sampling.h"
-#include "shade.h"
-#include "tiles.h"
-#include "pixel.h"
+#include "orbits.h"
+#include "stages.h"
 #include "coloring.h"
-#include "planes.h"
-#include "stage.h"
-#include "state.h"
-#include "eye.h"
 #include "asked.h"
 #include "bump_places.h"
 
 // Keeps what the formula answers at spots, or at a place around them. On objects beside the set it has an answer for traps only.
-INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, __constant const struct Material *questions,
-                         __constant const struct Orbit *orbit, __constant const scalar *k, world w) {
+INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, material_record questions,
+                         orbit_record orbit, constants k, world w) {
     // After the scene's own record.
     const int count = place == AT_SPOT ? w.settings->asked_count : w.settings->bump_asked;
     for (int i = 0; i < count; ++i) {
-        __constant const struct Material *m = questions + i;
+        material_record m = questions + i;
         const mask answered = m->asks == MAP_TRAP ? asks : of_set;
         const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
         lanes_store(answer, asked_at(s, place, i, w));
@@ -42,9 +28,7 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
 }
 
 STAGE(color_spots) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     spot here = spot_kept(s, bounce);
     const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
     if (!any_lane(settings->asked_count > 0 ? seen : found)) return;

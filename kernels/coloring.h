@@ -20,8 +20,7 @@ typedef struct {
 // Follows a way until it is inside (`inward` 1) or outside (0) the solid of `limit` applications: from the distance `begin`
 // in steps that grow from `shortest` to `longest`, then by bisection. What is thinner than a step may be missed.
 INLINE gate way_until(int inward, vec from, vec direction, real begin, real shortest, real longest, real farthest, int limit,
-                      mask active, __constant const struct Material *material, __constant const struct Orbit *orbit,
-                      __constant const scalar *k) {
+                      mask active, material_record material, orbit_record orbit, constants k) {
     gate met = {active & ~active, begin, (real)(REAL_LARGEST)};
     real t = begin;
     // Not finer than the resolution of the number type.
@@ -44,8 +43,8 @@ INLINE gate way_until(int inward, vec from, vec direction, real begin, real shor
 
 // How long the way from a point of the surface through the set is, from where it enters the set to where it first leaves it:
 // 0 where the set does not begin within ENTRANCE_REACH or a step, at most `coloring_limit`. `direction` has length 1.
-INLINE real set_thickness(vec point, vec direction, real cone, mask active, __constant const struct Material *material,
-                          __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real set_thickness(vec point, vec direction, real cone, mask active, material_record material,
+                          orbit_record orbit, constants k) {
     const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
     real begin = R(0.0), shortest = fmax(ENTRANCE_START * cone, WAY_TOLERANCE * step);
     real longest = fmax(ENTRANCE_REACH * cone, step), farthest = longest;
@@ -73,8 +72,7 @@ INLINE real set_thickness(vec point, vec direction, real cone, mask active, __co
 // How far the surface of `layer` applications is from a point of the scene's own: outwards where that is a larger solid (fewer
 // applications) and inwards where it is a smaller one, never negative, at most `coloring_limit`; exact to the footprint that
 // the point may lie before its own surface. `outward` has length 1.
-INLINE real layer_distance(vec point, vec outward, mask active, __constant const struct Material *material,
-                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real layer_distance(vec point, vec outward, mask active, material_record material, orbit_record orbit, constants k) {
     const real step = (real)(material->coloring_step), limit = (real)(material->coloring_limit);
     const int inward = material->layer > orbit->iterations;
     const gate met = way_until(inward, point, vec_scale(outward, inward ? R(-1.0) : R(1.0)), R(0.0), WAY_START * step, step,
@@ -82,12 +80,10 @@ INLINE real layer_distance(vec point, vec outward, mask active, __constant const
     return pick(met.found, fmin(R(0.5) * (met.before + met.beyond), limit), limit);
 }
 
-#include "trap.h"
 #include "trap_near.h"
 
 // The same, for the trap that chooses colours.
-INLINE real orbit_trap(vec point, mask active, __constant const struct Material *material, __constant const struct Orbit *orbit,
-                       __constant const scalar *k) {
+INLINE real orbit_trap(vec point, mask active, material_record material, orbit_record orbit, constants k) {
     const trap near = {material->trap_shape, vec_splat(material->trap_center), vec_splat(material->trap_direction), (real)(material->trap_radius)};
     return orbit_near(near, point, active, orbit, k);
 }
@@ -95,8 +91,7 @@ INLINE real orbit_trap(vec point, mask active, __constant const struct Material 
 // What chooses the colour of a point of the surface, in scene units (a trap's: those of z; `smooth`: applications; `residual`:
 // footprints). `view_direction` leads from the viewer to the point, length 1; `cone` is the footprint there.
 INLINE real coloring_quantity(vec point, vec normal, vec view_direction, real cone, real smooth, real residual, mask active,
-                              __constant const struct Material *material, __constant const struct Orbit *orbit,
-                              __constant const scalar *k) {
+                              material_record material, orbit_record orbit, constants k) {
     switch (material->coloring) {
     case COLORING_RESIDUAL: return residual;
     case COLORING_THICKNESS: {

@@ -1,12 +1,6 @@
 // Entry point of the cut-plane renderer: one evaluation for each sample.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
+#include "orbits.h"
 #include "view.h"
-#include "formula.h"
-#include "solids.h"
 #include "sampling.h"
 #include "color.h"
 #include "tiles.h"
@@ -16,11 +10,11 @@
 
 // What a shot reads.
 typedef struct {
-    __constant const struct View *view;
+    view_record view;
     __constant const struct Sampling *sampling;
-    __constant const struct Orbit *orbit;
-    __constant const scalar *k;
-    __global const struct CutPlane *plane;
+    orbit_record orbit;
+    constants k;
+    plane_record plane;
     __global const float *palette;
 } world;
 
@@ -29,25 +23,18 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     real time = R(0.0);
     if (w.view->spans > 0) time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
     const vec right = VIEW_VEC(w.view, right, time), down = VIEW_VEC(w.view, down, time);
-    shot s;
-    s.point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);
-    const escaped e = plane_escape(s.point, active, w.plane->smooth, w.plane->periodicity, w.plane->iterations, w.orbit, w.k);
-    s.radiance = escape_color(e, w.plane, w.palette);
-    s.hit = active;
-    s.coverage = R(1.0);
-    s.depth = R(0.0);
-    s.normal = vec_scale(VIEW_VEC(w.view, axis, time), R(-1.0));
-    s.smooth = e.count;
-    s.steps = e.applications;
+    const vec point = vec_along(vec_along(VIEW_VEC(w.view, center, time), from_center_x + across, right), from_center_y + below, down);
+    const escaped e = plane_escape(point, active, w.plane->smooth, w.plane->periodicity, w.plane->iterations, w.orbit, w.k);
     cost->steps += pick(active, R(1.0), R(0.0));
     cost->count += pick(active, e.applications, R(0.0));
-    return s;
+    return (shot){.radiance = escape_color(e, w.plane, w.palette), .hit = active, .coverage = R(1.0), .depth = R(0.0), .point = point,
+                  .normal = vec_scale(VIEW_VEC(w.view, axis, time), R(-1.0)), .smooth = e.count, .steps = e.applications};
 }
 
 #include "packets.h"
 
-__kernel void cut_plane(PASS_BUFFERS, __constant const struct Orbit *orbit, __constant const scalar *k,
-                        __global const struct CutPlane *plane, __global const float *palette, PASS_SPAN) {
+__kernel void cut_plane(PASS_BUFFERS, orbit_record orbit, constants k,
+                        plane_record plane, __global const float *palette, PASS_SPAN) {
     const world w = {view, sampling, orbit, k, plane, palette};
     const pass span = PASS;
     render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);

@@ -1,3 +1,11 @@
+// Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
+// (INTERPRETED is defined for a driver that cannot: see `cannot_run_optimised_code` in clfractal/device/select.py.)
+#ifdef INTERPRETED
+#define INLINE static inline
+#else
+#define INLINE static inline __attribute__((always_inline))
+#endif
+
 // Built-in functions written in the compiler's own operations, under the built-ins' own names.
 //
 // A CPU driver brings its built-in functions as a library of compiled code. Where that library was compiled for other features
@@ -67,11 +75,9 @@
 #define DIRECT_ROOT_OF_HALVES(type) DIRECT_ROOT(type, (type)(direct_sqrt(a.lo), direct_sqrt(a.hi)))
 
 #if __has_builtin(__builtin_elementwise_sqrt)
-#define DIRECT_ROOTS_IN(number)                                                        \
-    DIRECT_ROOT(number, __builtin_elementwise_sqrt(a))                                 \
-    DIRECT_ROOT(number##4, __builtin_elementwise_sqrt(a))                              \
-    DIRECT_ROOT(number##8, __builtin_elementwise_sqrt(a))                              \
-    DIRECT_ROOT(number##16, __builtin_elementwise_sqrt(a))
+#define DIRECT_ROOTS_IN(number)                                                                                       \
+    DIRECT_ROOT(number, __builtin_elementwise_sqrt(a)) DIRECT_ROOT(number##4, __builtin_elementwise_sqrt(a))          \
+    DIRECT_ROOT(number##8, __builtin_elementwise_sqrt(a)) DIRECT_ROOT(number##16, __builtin_elementwise_sqrt(a))
 #define DIRECT_ROOTS DIRECT_ROOTS_IN(float)
 #define DIRECT_ROOTS_OF_DOUBLES DIRECT_ROOTS_IN(double)
 #elif defined(__x86_64__) && __has_builtin(__builtin_ia32_sqrtps) && __has_builtin(__builtin_ia32_sqrtpd)
@@ -136,32 +142,15 @@ DIRECT_PICK(double8, long8, m ? yes : no)
 DIRECT_PICK(double16, long16, m ? yes : no)
 #endif
 
-DIRECT_MEMORY(float, 4)
-DIRECT_MEMORY(float, 8)
-DIRECT_MEMORY(float, 16)
-DIRECT_MEMORY(int, 4)
-DIRECT_MEMORY(int, 8)
-DIRECT_MEMORY(int, 16)
-DIRECT_MEMORY(uint, 4)
-DIRECT_MEMORY(uint, 8)
-DIRECT_MEMORY(uint, 16)
-DIRECT_MEMORY(uchar, 4)
-DIRECT_MEMORY(uchar, 8)
-DIRECT_MEMORY(uchar, 16)
-DIRECT_WHOLE(int)
-DIRECT_WHOLE(int4)
-DIRECT_WHOLE(int8)
-DIRECT_WHOLE(int16)
-DIRECT_WHOLE(uint)
-DIRECT_WHOLE(uint4)
-DIRECT_WHOLE(uint8)
-DIRECT_WHOLE(uint16)
-DIRECT_WHOLE(long)
-DIRECT_WHOLE(ulong)
-DIRECT_REAL(float, uint, 0x80000000u)
-DIRECT_REAL(float4, uint4, 0x80000000u)
-DIRECT_REAL(float8, uint8, 0x80000000u)
-DIRECT_REAL(float16, uint16, 0x80000000u)
+// For all widths.
+#define DIRECT_MEMORIES(type) DIRECT_MEMORY(type, 4) DIRECT_MEMORY(type, 8) DIRECT_MEMORY(type, 16)
+#define DIRECT_WHOLES(type) DIRECT_WHOLE(type) DIRECT_WHOLE(type##4) DIRECT_WHOLE(type##8) DIRECT_WHOLE(type##16)
+#define DIRECT_REALS(type, bits, sign)                                                                                  \
+    DIRECT_REAL(type, bits, sign) DIRECT_REAL(type##4, bits##4, sign)                                                   \
+    DIRECT_REAL(type##8, bits##8, sign) DIRECT_REAL(type##16, bits##16, sign)
+DIRECT_MEMORIES(float) DIRECT_MEMORIES(int) DIRECT_MEMORIES(uint) DIRECT_MEMORIES(uchar)
+DIRECT_WHOLES(int) DIRECT_WHOLES(uint) DIRECT_WHOLE(ulong)
+DIRECT_REALS(float, uint, 0x80000000u)
 DIRECT uchar direct_uchar_sat(float a) { return (uchar)direct_clamp(a, 0.0f, 255.0f); }
 #if __has_builtin(__builtin_rintf)
 DIRECT uchar direct_uchar_sat_rte(float a) { return (uchar)__builtin_rintf(direct_clamp(a, 0.0f, 255.0f)); }
@@ -169,16 +158,11 @@ DIRECT uchar direct_uchar_sat_rte(float a) { return (uchar)__builtin_rintf(direc
 #define convert_uchar_sat_rte(a) direct_uchar_sat_rte(a)
 #endif
 #if REAL_IS_DOUBLE
-DIRECT_MEMORY(double, 4)
-DIRECT_MEMORY(double, 8)
-DIRECT_MEMORY(double, 16)
-DIRECT_WHOLE(long4)
-DIRECT_WHOLE(long8)
-DIRECT_WHOLE(long16)
-DIRECT_REAL(double, ulong, 0x8000000000000000ul)
-DIRECT_REAL(double4, ulong4, 0x8000000000000000ul)
-DIRECT_REAL(double8, ulong8, 0x8000000000000000ul)
-DIRECT_REAL(double16, ulong16, 0x8000000000000000ul)
+DIRECT_MEMORIES(double)
+DIRECT_WHOLES(long)
+DIRECT_REALS(double, ulong, 0x8000000000000000ul)
+#else
+DIRECT_WHOLE(long)
 #endif
 #ifdef DIRECT_ROOTS
 DIRECT_ROOTS

@@ -15,11 +15,11 @@
 #include "sun.h"
 
 // Whether there is one, and whether it has a sun before it.
-INLINE int has_environment(__constant const struct Material *m) { return m->environment_width > 0; }
-INLINE int has_sun(__constant const struct Material *m) { return m->environment_sun; }
+INLINE int has_environment(material_record m) { return m->environment_width > 0; }
+INLINE int has_sun(material_record m) { return m->environment_sun; }
 
 // Where in the picture a direction lies: parts of its width and height, both 0 to 1.
-INLINE void environment_place(vec direction, __constant const struct Material *m, real *across, real *below) {
+INLINE void environment_place(vec direction, material_record m, real *across, real *below) {
     const real c = (real)(m->environment_turn[0]), s = (real)(m->environment_turn[1]);
     const real x = c * direction.x + s * direction.y, y = c * direction.y - s * direction.x;
     *across = R(0.5) + real_atan2(x, y) / (real)(ENVIRONMENT_TURN);
@@ -28,7 +28,7 @@ INLINE void environment_place(vec direction, __constant const struct Material *m
 
 // The light that comes from a direction: pixels blended linearly, around the sides too; above the middle of the top row and
 // below the middle of the last row they are constant.
-CALLED color environment_color(vec direction, __constant const struct Material *m, __global const float *map) {
+CALLED color environment_color(vec direction, material_record m, __global const float *map) {
     const int width = m->environment_width, height = m->environment_height;
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *pixels = map + 2 * (rows + 1) + rows * (2 * columns + 1);
@@ -37,7 +37,7 @@ CALLED color environment_color(vec direction, __constant const struct Material *
     // fmax and fmin turn what is not a number into one: converting it to a whole number would be undefined.
     across = fmin(fmax(across * (real)((scalar)width) - R(0.5), R(-0.5)), (real)((scalar)width - S(0.5)));
     below = fmin(fmax(below * (real)((scalar)height) - R(0.5), R(0.0)), (real)((scalar)(height - 1)));
-    scalar x[LANES], y[LANES], red[LANES], green[LANES], blue[LANES];
+    scalar x[LANES], y[LANES], mixed[3][LANES];
     lanes_store(across, x);
     lanes_store(below, y);
     for (int lane = 0; lane < LANES; ++lane) {
@@ -46,15 +46,12 @@ CALLED color environment_color(vec direction, __constant const struct Material *
         const int first = column < 0 ? width - 1 : column, second = first + 1 == width ? 0 : first + 1;
         __global const float *upper = pixels + 3 * width * row;
         __global const float *lower = row + 1 < height ? upper + 3 * width : upper;
-        red[lane] = mix(mix(upper[3 * first], upper[3 * second], right),
-                        mix(lower[3 * first], lower[3 * second], right), low);
-        green[lane] = mix(mix(upper[3 * first + 1], upper[3 * second + 1], right),
-                          mix(lower[3 * first + 1], lower[3 * second + 1], right), low);
-        blue[lane] = mix(mix(upper[3 * first + 2], upper[3 * second + 2], right),
-                         mix(lower[3 * first + 2], lower[3 * second + 2], right), low);
+        for (int i = 0; i < 3; ++i, ++upper, ++lower) {
+            mixed[i][lane] = mix(mix(upper[3 * first], upper[3 * second], right), mix(lower[3 * first], lower[3 * second], right), low);
+        }
     }
     const real intensity = (real)(m->environment_intensity);
-    color found = color_of(lanes_load(red), lanes_load(green), lanes_load(blue));
+    color found = color_of(lanes_load(mixed[0]), lanes_load(mixed[1]), lanes_load(mixed[2]));
     if (has_sun(m)) found = color_add(found, sun_light(direction, m, sun_numbers(m, map)));
     return color_scale(found, intensity);
 }
@@ -71,7 +68,7 @@ INLINE int environment_find(__global const float *cumulative, int count, scalar 
 }
 
 // A direction chosen by the map's brightness from two numbers in [0, 1), and its probability per steradian, which is above 0.
-INLINE vec map_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+INLINE vec map_sample(real u, real v, material_record m, __global const float *map, real *density) {
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *by_row = map + rows + 1, *by_column = by_row + rows + 1;
     __global const float *densities = by_column + rows * (columns + 1);
@@ -99,7 +96,7 @@ INLINE vec map_sample(real u, real v, __constant const struct Material *m, __glo
 }
 
 // Probability per steradian with which `map_sample` chooses a direction; 0 only where no light comes from.
-INLINE real map_density(vec direction, __constant const struct Material *m, __global const float *map) {
+INLINE real map_density(vec direction, material_record m, __global const float *map) {
     const int rows = m->environment_rows, columns = m->environment_columns;
     __global const float *densities = map + 2 * (rows + 1) + rows * (columns + 1);
     real across, below;
@@ -113,7 +110,7 @@ INLINE real map_density(vec direction, __constant const struct Material *m, __gl
 }
 
 // The same of a map with a sun before it: its disc or the map, and the probability by both ways together.
-INLINE vec sun_or_map_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+INLINE vec sun_or_map_sample(real u, real v, material_record m, __global const float *map, real *density) {
     __global const float *sun = sun_numbers(m, map);
     const real share = sun_share(sun), rest = R(1.0) - share;
     const mask of_sun = less(v, share);
@@ -128,12 +125,12 @@ INLINE vec sun_or_map_sample(real u, real v, __constant const struct Material *m
 }
 
 // A direction chosen by the environment's brightness, and its probability per steradian.
-INLINE vec environment_sample(real u, real v, __constant const struct Material *m, __global const float *map, real *density) {
+INLINE vec environment_sample(real u, real v, material_record m, __global const float *map, real *density) {
     if (has_sun(m)) return sun_or_map_sample(u, v, m, map, density);
     return map_sample(u, v, m, map, density);
 }
 
-INLINE real environment_density(vec direction, __constant const struct Material *m, __global const float *map) {
+INLINE real environment_density(vec direction, material_record m, __global const float *map) {
     const real of_map = map_density(direction, m, map);
     if (!has_sun(m)) return of_map;
     __global const float *sun = sun_numbers(m, map);

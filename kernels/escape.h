@@ -3,7 +3,24 @@
 // From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle;
 // REPEATS_FROM, the application from which on a chain's turns repeat themselves.
 
-#include "escape_types.h"
+// Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
+#if REAL_IS_DOUBLE
+#if LANES == 1
+#define same_bits(a, b) (-(as_long(a) == as_long(b)))
+#else
+#define same_bits(a, b) (JOIN(as_long, LANES)(a) == JOIN(as_long, LANES)(b))
+#endif
+#elif LANES == 1
+#define same_bits(a, b) (-(as_int(a) == as_int(b)))
+#else
+#define same_bits(a, b) (as_mask(a) == as_mask(b))
+#endif
+
+typedef struct {
+    real count;         // applications until |z| > bailout, whole or smooth; the limit for points that never get there
+    mask inside;
+    real applications;  // that it took to know
+} escaped;
 
 // The escape of points within `most` applications. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
 // of the distances of orbit.h; else they are whole, those of `formula_escape_count`.
@@ -12,8 +29,8 @@
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
 // will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
-INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
-                            __constant const scalar *k) {
+INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int periodicity, int most, orbit_record orbit,
+                            constants k) {
     state c, z;
     start(point, k, &c, &z);
     const real radius_square = (real)(smooth ? orbit->distance_square : orbit->bailout_square);
@@ -42,10 +59,9 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
                 if (!HAS_SHAPE && smooth) highest = fmax(highest, square);
             }
             if (!HAS_SHAPE && periodicity) {
-                mask back = alive & same_bits(z.s0, kept.s0) & same_bits(z.s1, kept.s1) & same_bits(z.s2, kept.s2);
-#if STATE_SIZE > 3
-                back &= same_bits(z.s3, kept.s3);
-#endif
+                mask back = alive;
+#define BACK(s) back &= same_bits(z.s, kept.s);
+                STATE_EACH(BACK)
                 // An orbit that comes and goes between the two radii is inside or not by the last application.
                 if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
                 if (comparable) {
@@ -67,28 +83,18 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
         alive &= ~inside;
         limit = most + (orbit->longest - orbit->iterations);
     }
-    escaped result;
-    result.applications = count;
-    result.inside = inside;
-    if (smooth) {
-        const orbit_end last = {count, inside};
-        surface_point surface;
-        surface.gradient = vec_of(R(0.0), R(0.0), R(0.0));
-        surface.square = square;
-        surface.square_before = square_before;
-        count = formula_smooth_count(last, surface, orbit);
-    }
-    result.count = pick(inside, (real)((scalar)most), count);
-    return result;
+    const orbit_end last = {count, inside};
+    const surface_point surface = {.square = square, .square_before = square_before};
+    const real told = smooth ? formula_smooth_count(last, surface, orbit) : count;
+    return (escaped){pick(inside, (real)((scalar)most), told), inside, count};
 }
 
 CALLED void other_escape(const vec *point, const mask *active, int smooth, int periodicity, int most, escaped *found,
-                         __constant const struct Orbit *orbit, __constant const scalar *k) {
+                         orbit_record orbit, constants k) {
     *found = escape_by(0, *point, *active, smooth, periodicity, most, orbit, k);
 }
 
-INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
-                              __constant const scalar *k) {
+INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, orbit_record orbit, constants k) {
     if (has_usual_values(k)) return escape_by(1, point, active, smooth, periodicity, most, orbit, k);
     escaped found;
     other_escape(&point, &active, smooth, periodicity, most, &found, orbit, k);
@@ -97,24 +103,21 @@ INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicit
 
 // Of several solids that are joined counts are the largest of what is beside each other, and the smaller of both where only what they
 // have in common is left. A formula has its own limit, unless the plane has one.
-INLINE escaped one_escape(vec own, mask active, int smooth, int periodicity, int limit, __constant const struct Orbit *o,
-                          __constant const scalar *k) {
+INLINE escaped one_escape(vec own, mask active, int smooth, int periodicity, int limit, orbit_record o, constants k) {
     escaped one = {R(0.0), active & ~active, R(0.0)};
     if (o->kind != SOLID_FORMULA) {
-        solid_found found;
-        solid_simple(o, own, &found);
-        one.inside = active & found.inside;
+        one.inside = active & simple_holds(o, own);
         return one;
     }
     return formula_escape(own, active, smooth, periodicity, limit, o, k + o->first);
 }
 
 CALLED escaped solids_escape(const vec *point, mask active, int smooth, int periodicity, int most,
-                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+                             orbit_record orbit, constants k) {
     const real limit = (real)((scalar)most);
     escaped all = {R(0.0), active & ~active, R(0.0)};
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const int own = most == orbit->iterations ? o->iterations : most;
         const escaped one = one_escape(solid_own(o, *point), active, smooth, periodicity, own, o, k);
         const real count = pick(one.inside, limit, fmin(one.count, limit));
@@ -137,8 +140,7 @@ CALLED escaped solids_escape(const vec *point, mask active, int smooth, int peri
     return all;
 }
 
-INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, int most, __constant const struct Orbit *orbit,
-                            __constant const scalar *k) {
+INLINE escaped plane_escape(vec point, mask active, int smooth, int periodicity, int most, orbit_record orbit, constants k) {
     if (!JOINED) return formula_escape(point, active, smooth, periodicity, most, orbit, k);
     return solids_escape(&point, active, smooth, periodicity, most, orbit, k);
 }

@@ -1,9 +1,7 @@
 // Colours of a plane by escape counts: a palette over count / limit, and a colour for the inside.
-#define CURVE_LINEAR 0
-#define CURVE_ROOT 1
-#define CURVE_LOG 2
+enum { CURVE_LINEAR, CURVE_ROOT, CURVE_LOG };
 
-INLINE color escape_color(escaped e, __global const struct CutPlane *colors, __global const float *palette) {
+INLINE color escape_color(escaped e, plane_record colors, __global const float *palette) {
     real quantity;
     if (colors->curve == CURVE_LOG) {
         quantity = log(fmax(e.count, R(1.0))) * (real)(colors->inverse_limit);

@@ -25,14 +25,11 @@ INLINE real spot_material(const spot *here, world w) { return object_material(he
 // The sums of the packet's pixels before this sample.
 INLINE pixel sums_before(stage s, const place_in_pass *here) {
     if (s.sample == s.span.first) return pixel_before(s.span, here);
-    pixel p;
-    STATE_RECALL(s, p, STATE_SUMS);
+    STATE_KEPT(s, pixel, p, STATE_SUMS);
     return p;
 }
 
-CALLED ray eye_ray(const aim *a, __constant const struct View *view) {
-    return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view);
-}
+CALLED ray eye_ray(const aim *a, view_record view) { return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view); }
 
 INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;

@@ -9,10 +9,10 @@ INLINE real fog_mean(real start, real climb) {
     return pick(level, low * series, (low - high) / pick(level, R(1.0), climb));
 }
 
-INLINE real fog_level(vec a, __constant const struct Material *m) { return vec_dot(a, vec_splat(m->fog_up)); }
+INLINE real fog_level(vec a, material_record m) { return vec_dot(a, vec_splat(m->fog_up)); }
 
 // The optical depth of a way along a ray.
-INLINE real fog_depth(vec origin, vec direction, real way, __constant const struct Material *m) {
+INLINE real fog_depth(vec origin, vec direction, real way, material_record m) {
     const real even = (real)(m->fog_density) * way;
     if (m->fog_height <= S(0.0)) return even;
     const real share = R(1.0) / (real)(m->fog_height);
@@ -20,7 +20,7 @@ INLINE real fog_depth(vec origin, vec direction, real way, __constant const stru
 }
 
 // The part of a light from infinitely far away that comes through.
-INLINE real fog_passes_all(vec origin, vec direction, __constant const struct Material *m) {
+INLINE real fog_passes_all(vec origin, vec direction, material_record m) {
     if (m->fog_height <= S(0.0)) return R(0.0);
     const real start = (fog_level(origin, m) - (real)(m->fog_base)) / (real)(m->fog_height);
     const real rise = fog_level(direction, m);

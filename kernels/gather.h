@@ -39,6 +39,8 @@ typedef mask ints;
 #endif
 #endif
 
+INLINE real between(real a, real b, real share) { return a + (b - a) * share; }
+
 // 32 bits at base + index, in whole ints.
 INLINE ints gather_ints(__global const int *base, ints index) {
 #ifdef gather_at

@@ -1,11 +1,5 @@
 // Entry points that know the formula: rays within clear glass go on to where they leave the set. They are the second ones of the queue.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
+#include "orbits.h"
 #include "rays.h"
 #include "queue.h"
 #include "arguments.h"

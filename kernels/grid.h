@@ -3,10 +3,7 @@
 // `sides` has three digits, 8 bits apart, for each octant of directions: in it, a cube of 1 << digits bricks a side that
 // begins with this brick is empty.
 // `blocks` has for stored bricks the blocks of 2 x 2 x 2 cells that may be visible.
-#define BRICK_CELLS 8
-#define BRICK_SIDE 9
-#define BRICK_STRIDE 736   // samples from one brick to the next
-
+#include "bricks.h"
 #include "gather.h"
 
 typedef struct {
@@ -32,14 +29,9 @@ INLINE cell cell_at(vec p, __constant const struct Grid *about) {
     const real x = least(most(p.x, R(0.0)), (real)((scalar)(about->sides[0] - 1)));
     const real y = least(most(p.y, R(0.0)), (real)((scalar)(about->sides[1] - 1)));
     const real z = least(most(p.z, R(0.0)), (real)((scalar)(about->sides[2] - 1)));
-    cell c;
-    c.x = min(to_ints(x), (ints)(max(about->sides[0] - 2, 0)));
-    c.y = min(to_ints(y), (ints)(max(about->sides[1] - 2, 0)));
-    c.z = min(to_ints(z), (ints)(max(about->sides[2] - 2, 0)));
-    c.u = x - to_reals(c.x);
-    c.v = y - to_reals(c.y);
-    c.w = z - to_reals(c.z);
-    return c;
+    const ints i = min(to_ints(x), (ints)(max(about->sides[0] - 2, 0))), j = min(to_ints(y), (ints)(max(about->sides[1] - 2, 0)));
+    const ints k = min(to_ints(z), (ints)(max(about->sides[2] - 2, 0)));
+    return (cell){i, j, k, x - to_reals(i), y - to_reals(j), z - to_reals(k)};
 }
 
 // The table's entry for a cell's brick.
@@ -61,8 +53,6 @@ INLINE ints octant_at(cell c, ints entry, mask stored, grid g, mask *seen) {
 
 // Where a cell's first corner lies in its stored brick.
 INLINE ints corner_of(cell c) { return ((c.z & 7) * BRICK_SIDE + (c.y & 7)) * BRICK_SIDE + (c.x & 7); }
-
-INLINE real between(real a, real b, real share) { return a + (b - a) * share; }
 
 // The values at the corners of a cell in one buffer of stored bricks, x fastest, as they are kept (0 to 255 in 8 bits).
 INLINE void corner_values(__global const uchar *values, int floats, ints at, real *corners) {

@@ -96,14 +96,6 @@ typedef JOIN(int, LANES) mask;
 #endif
 #endif
 
-// Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
-// (INTERPRETED is defined for a driver that cannot: see `cannot_run_optimised_code` in clfractal/device/select.py.)
-#ifdef INTERPRETED
-#define INLINE static inline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
-
 // Of functions that are called on a processor, and so compiled once: what a kernel does, since PoCL makes three functions of each
 // kernel and inlines into all of them what it does; and long work for a packet that several kernels do. Functions that ask for the
 // place of the work-item are inlined by PoCL in spite of it.
@@ -183,5 +175,16 @@ INLINE uint lanes_bits(mask m) {
 }
 #endif
 #endif
+
+// The host's records (structs.h), and the constants of formulas, as functions are given them.
+typedef __constant const struct Orbit *orbit_record;
+typedef __constant const struct March *march_record;
+typedef __constant const struct Material *material_record;
+typedef __constant const struct Light *light_record;
+typedef __constant const struct View *view_record;
+typedef __global const struct Object *object_record;
+typedef __global const struct CutPlane *plane_record;
+typedef __global const struct Map *map_record;
+typedef __constant const scalar *constants;
 
 #include "repairs.h"

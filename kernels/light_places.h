@@ -2,7 +2,7 @@
 #include "rectangles.h"
 
 // 1 - cos of half the angle that a light fills; for all but rectangles.
-INLINE real light_spread(__constant const struct Light *light, vec point) {
+INLINE real light_spread(light_record light, vec point) {
     if (light->kind != LIGHT_SPHERE) return (real)(light->spread);
     const vec offset = vec_sub(vec_splat(light->vector), point);
     const real square = most(vec_dot(offset, offset), (real)(REAL_SMALLEST));
@@ -11,29 +11,27 @@ INLINE real light_spread(__constant const struct Light *light, vec point) {
 }
 
 // The direction to a place of the light; `middle` is the one to its middle.
-INLINE vec light_direction(__constant const struct Light *light, vec point, vec middle, real u, real v) {
+INLINE vec light_direction(light_record light, vec point, vec middle, real u, real v) {
     if (light->kind != LIGHT_RECTANGLE) return cone_direction(middle, light_spread(light, point), u, v);
     return rectangle_direction(light, point, u, v);
 }
 
 // How far a rectangle's plane is.
-INLINE real plane_distance(__constant const struct Light *light, vec point, vec direction) {
+INLINE real plane_distance(light_record light, vec point, vec direction) {
     const vec axis = vec_splat(light->axis);
     return vec_dot(vec_sub(vec_splat(light->vector), point), axis) / vec_dot(direction, axis);
 }
 
 // Per steradian, with which `light_direction` chooses a direction that meets the light.
-INLINE real light_density(__constant const struct Light *light, vec point, vec direction) {
+INLINE real light_density(light_record light, vec point, vec direction) {
     if (light->kind == LIGHT_RECTANGLE) return rectangle_density(light, point, direction);
     return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
 }
 
-INLINE int light_is_seen(__constant const struct Light *light) {
-    return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE;
-}
+INLINE int light_is_seen(light_record light) { return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE; }
 
 // Light from one of the directions that `light_direction` finds: the mean over these is the light's.
-INLINE incidence light_along(__constant const struct Light *light, vec point, vec direction) {
+INLINE incidence light_along(light_record light, vec point, vec direction) {
     incidence in = light_at(light, point);
     in.toward = direction;
     if (light_is_seen(light)) {
@@ -45,7 +43,7 @@ INLINE incidence light_along(__constant const struct Light *light, vec point, ve
 }
 
 // Where a ray meets a ball from outside, or a rectangle's shining side.
-INLINE mask light_met_at(__constant const struct Light *light, vec origin, vec direction, real *distance) {
+INLINE mask light_met_at(light_record light, vec origin, vec direction, real *distance) {
     const vec offset = vec_sub(vec_splat(light->vector), origin);
     if (light->kind == LIGHT_SPHERE) {
         const real along = vec_dot(offset, direction);
@@ -62,7 +60,7 @@ INLINE mask light_met_at(__constant const struct Light *light, vec origin, vec d
 }
 
 // About the irradiance that a light can bring to a point.
-CALLED real light_weight(__constant const struct Light *light, const vec *point) {
+CALLED real light_weight(light_record light, const vec *point) {
     const color c = color_splat(light->color);
     return LIGHT_PI * light_at(light, *point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
 }
@@ -71,7 +69,7 @@ CALLED real light_weight(__constant const struct Light *light, const vec *point)
 CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     mask met = less(R(1.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
-        __constant const struct Light *light = w.lights + i;
+        light_record light = w.lights + i;
         if (!light_is_seen(light) || (of_eye && !light->visible)) continue;
         real distance;
         const mask here = light_met_at(light, *origin, *direction, &distance) & less(distance, *far);

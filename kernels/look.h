@@ -3,9 +3,10 @@ typedef struct {
     real ambient, diffuse, surround, shininess, sharp;
     color specular, mirror, mirror_edge, emission;
 } look;
+NUMBERS_PICKED(look)
 
 INLINE look look_of_object(real object, world w) {
-    __constant const struct Material *m = w.material;
+    material_record m = w.material;
     const color none = color_of(R(0.0), R(0.0), R(0.0));
     const real specular = (real)(m->specular), mirror = (real)(m->reflection);
     look found = {(real)(m->ambient), (real)(m->diffuse), (real)(m->diffuse), (real)(m->shininess), R(0.0),
@@ -13,16 +14,10 @@ INLINE look look_of_object(real object, world w) {
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask there = equal(object, (real)((scalar)(i + 1)));
         if (!any_lane(there)) continue;
-        __global const struct Object *o = w.objects + i;
-        found.ambient = pick(there, (real)(o->ambient), found.ambient);
-        found.diffuse = pick(there, (real)(o->diffuse), found.diffuse);
-        found.surround = pick(there, (real)(o->surround), found.surround);
-        found.shininess = pick(there, (real)(o->shininess), found.shininess);
-        found.sharp = pick(there, (real)(o->sharp), found.sharp);
-        found.specular = color_pick(there, color_splat(o->specular), found.specular);
-        found.mirror = color_pick(there, color_splat(o->mirror), found.mirror);
-        found.mirror_edge = color_pick(there, color_splat(o->mirror_edge), found.mirror_edge);
-        found.emission = color_pick(there, color_splat(o->emission), found.emission);
+        object_record o = w.objects + i;
+        const look own = {(real)(o->ambient), (real)(o->diffuse), (real)(o->surround), (real)(o->shininess), (real)(o->sharp),
+                          color_splat(o->specular), color_splat(o->mirror), color_splat(o->mirror_edge), color_splat(o->emission)};
+        found = look_pick(there, own, found);
     }
     return found;
 }
@@ -41,7 +36,7 @@ INLINE real surround_of(look l) { return l.surround; }
 
 // Eq. 5; beside objects with a look. What a light with a size shows in a mirror is its picture there, and no highlight.
 INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
-                    __constant const struct Light *light, look l, world w) {
+                    light_record light, look l, world w) {
     if (w.settings->object_count == 0) return phong(surface, normal, to_viewer, in, lit, open, light, w.material);
     const attitude a = attitude_to(in, normal, to_viewer, lit);
     const real diffuse = pick(a.front, l.diffuse * a.facing, R(0.0));

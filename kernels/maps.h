@@ -13,7 +13,7 @@ INLINE float picture_number(__global const float *pixels, int width, int height,
 }
 
 // A picture at a place, in pictures, as sharp as `level` says: 0 is the picture, each next level half as wide (Williams 1983).
-INLINE color picture_color(real u, real v, real level, __global const struct Map *m, __global const float *tables) {
+INLINE color picture_color(real u, real v, real level, map_record m, __global const float *tables) {
     scalar across[LANES], down[LANES], levels[LANES], found[3][LANES];
     lanes_store(u - floor(u), across);
     lanes_store(v - floor(v), down);
@@ -45,7 +45,7 @@ INLINE color picture_color(real u, real v, real level, __global const struct Map
 INLINE real side_weight(real part, scalar sharpness) { return pow(fmax(fabs(part), R(1e-6)), (real)(sharpness)); }
 
 // A picture shown along the three axes, blended by how much the surface faces each; its top is at the larger z or y.
-INLINE color picture_at(vec point, vec normal, real cone, __global const struct Map *m, __global const float *tables) {
+INLINE color picture_at(vec point, vec normal, real cone, map_record m, __global const float *tables) {
     const real pixel = (real)(m->size / (scalar)m->width);
     const real level = log2(clamp(cone / pixel, R(1.0), R(65536.0)));
     const real wide = R(1.0) / (real)(m->size), high = wide * (real)((scalar)m->width / (scalar)m->height);
@@ -75,7 +75,7 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
 }
 
 // At a spot, where `place` is AT_SPOT, or at a place around it.
-INLINE real map_quantity(stage s, const spot *here, int place, __global const struct Map *m, world w) {
+INLINE real map_quantity(stage s, const spot *here, int place, map_record m, world w) {
     const vec given = vec_splat(m->vector);
     vec normal = here->normal;
     real smooth = here->smooth;
@@ -91,7 +91,7 @@ INLINE real map_quantity(stage s, const spot *here, int place, __global const st
 }
 
 // What a map is at a spot: a colour, or three times the same number.
-INLINE color map_at(stage s, const spot *here, int place, __global const struct Map *m, world w) {
+INLINE color map_at(stage s, const spot *here, int place, map_record m, world w) {
     real quantity;
     if (m->levels > 0) {
         const color seen = picture_at(here->point, here->normal, here->cone, m, w.tables);

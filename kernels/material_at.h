@@ -1,16 +1,12 @@
 // The material of a spot: what paths scatter by.
+NUMBERS_PICKED(pbr)
+
 // Materials are mixed by the shares that they have in a spot. A colour counts by the light that it colours: that of a body which a medium
 // hides counts for nothing.
 typedef struct {
     pbr sum;
     real body, medium;   // how much of the light meets the bodies and the media of all parts
 } pbr_mix;
-
-INLINE pbr_mix pbr_nothing(void) {
-    pbr_mix m;
-    for (int i = 0; i < NUMBERS_OF(pbr_mix); ++i) ((real *)&m)[i] = R(0.0);
-    return m;
-}
 
 // Scales what only the light that meets the body, and the medium, is coloured by.
 INLINE void pbr_weigh(pbr *p, real body, real medium) {
@@ -40,7 +36,7 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     pbr p = pbr_of(material, here->tint);
     real *numbers = (real *)&p;
     for (int i = 0; i < material->map_count; ++i) {
-        __global const struct Map *m = w.maps + material->first_map + i;
+        map_record m = w.maps + material->first_map + i;
         const color found = map_at(s, here, AT_SPOT, m, w);
         numbers[m->number] = found.r;
         if (m->count < 3) continue;
@@ -62,7 +58,7 @@ CALLED pbr pbr_at(stage s, const spot *here, world w) {
     real shares[MOST_MATERIALS];
     const real root = spot_material(here, w);
     for (int i = 0; i < w.settings->material_count; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
-    pbr_mix mix = pbr_nothing();
+    pbr_mix mix = {0};
     for (int i = 0; i < w.settings->material_count; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
@@ -84,16 +80,12 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     const mask face = on_face(here);
     const real none = R(0.0), one = R(1.0);
     const color tint = color_of(fmin(here->tint.r, one), fmin(here->tint.g, one), fmin(here->tint.b, one));
-    p->base_color = color_pick(face, tint, p->base_color);
-    p->base_weight = pick(face, one, p->base_weight);
-    p->base_metalness = pick(face, none, p->base_metalness);
-    p->base_diffuse_roughness = pick(face, none, p->base_diffuse_roughness);
-    p->specular_weight = pick(face, none, p->specular_weight);
-    p->coat_weight = pick(face, none, p->coat_weight);
-    p->fuzz_weight = pick(face, none, p->fuzz_weight);
-    p->transmission_weight = pick(face, none, p->transmission_weight);
-    p->emission_luminance = pick(face, none, p->emission_luminance);
-    p->subsurface_weight = pick(face, none, p->subsurface_weight);
+    pbr matt = *p;
+    matt.base_color = tint;
+    matt.base_weight = one;
+    matt.base_metalness = matt.base_diffuse_roughness = matt.specular_weight = matt.coat_weight = matt.fuzz_weight = none;
+    matt.transmission_weight = matt.emission_luminance = matt.subsurface_weight = none;
+    *p = pbr_pick(face, matt, *p);
 }
 
 // What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
@@ -106,7 +98,7 @@ INLINE pbr pbr_found(stage s, const spot *here, world w) {
         one.share = other.share = R(0.0);
         one.tint = object_color(&here->normal, quantity, one.object, w);
         other.tint = object_color(&here->normal, quantity, other.object, w);
-        pbr_mix mix = pbr_nothing();
+        pbr_mix mix = {0};
         pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
         pbr_add(&mix, pbr_at(s, &other, w), here->share, w);
         p = pbr_mixed(mix, w);

@@ -29,5 +29,12 @@ INLINE void numbers_recall(real *numbers, int count, __global const scalar *from
     WRITTEN_OUT(count, RECALL_NUMBER)
 }
 
+// Of lanes `here` one struct of numbers, of the others another: TYPE_pick.
+#define NUMBERS_PICKED(type)                                                                                                 \
+    INLINE type type##_pick(mask here, type yes, type no) {                                                                 \
+        for (int i = 0; i < NUMBERS_OF(type); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]); \
+        return no;                                                                                                          \
+    }
+
 INLINE real number_of(mask m) { return pick(m, R(1.0), R(0.0)); }
 INLINE mask mask_of(real number) { return less(R(0.5), number); }

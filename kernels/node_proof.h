@@ -5,7 +5,7 @@
 
 // A node whose image, of radius r, comes near 0 in z: there a map of a degree above 1 has hardly any slope, as its middle
 // tells, but it has elsewhere in the node, and the distance would be too large.
-INLINE mask doubtful(real square, real radius_square, __constant const struct Orbit *orbit) {
+INLINE mask doubtful(real square, real radius_square, orbit_record orbit) {
     if (!LOGARITHMIC) return less(R(1.0), R(0.0));
     return less(R(0.25) * square, radius_square) & less(square, R(4.0));
 }
@@ -18,7 +18,7 @@ INLINE mask doubtful(real square, real radius_square, __constant const struct Or
 
 // The distance as `formula_distance` finds it, but the growth is that in any direction. The growth of |z| alone may vanish by
 // chance: a ray that steps too far is told so by its next step, a node by nothing.
-INLINE real formula_node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, constants k) {
     if (HAS_SHAPE) return formula_distance(point, equal(R(0.0), R(0.0)), orbit, k).step;
 #if HAS_DERIVATIVE
     state c, z;
@@ -77,25 +77,22 @@ INLINE real formula_node_distance(vec point, real reach, __constant const struct
 #endif
 
 INLINE real halved_difference_square(state a, state b) {
-    state d = {R(0.5) * (a.s0 - b.s0), R(0.5) * (a.s1 - b.s1), R(0.5) * (a.s2 - b.s2)};
-#if STATE_SIZE == 4
-    d.s3 = R(0.5) * (a.s3 - b.s3);
-#endif
+    state d;
+#define HALVED_DIFFERENCE(s) d.s = R(0.5) * (a.s - b.s);
+    STATE_EACH(HALVED_DIFFERENCE)
     return state_square(d);
 }
 INLINE real bend_square(state a, state b, state middle) {
-    state d = {R(0.5) * (a.s0 + b.s0) - middle.s0, R(0.5) * (a.s1 + b.s1) - middle.s1, R(0.5) * (a.s2 + b.s2) - middle.s2};
-#if STATE_SIZE == 4
-    d.s3 = R(0.5) * (a.s3 + b.s3) - middle.s3;
-#endif
+    state d;
+#define BEND_OF(s) d.s = R(0.5) * (a.s + b.s) - middle.s;
+    STATE_EACH(BEND_OF)
     return state_square(d);
 }
 
 // A node is inside as a whole if, after every application, its image in z is near to a parallelepiped, as its corners and its
 // middle tell, and twice its size around the middle's is within the bailout. Where the dynamics contract, that image shrinks;
 // at the edge of a region of contraction it bends (for analytic maps by r/d, d the distance to the edge: Koebe's theorem).
-INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, orbit_record orbit, constants k) {
     if (!LOGARITHMIC || HAS_SHAPE) return candidates & ~candidates;
     state c[CORNERS + 1], z[CORNERS + 1];
     UNROLLED_ALONE
@@ -127,13 +124,9 @@ INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, __co
 
 // How far a place is at least from one solid; below 0 how deep it is at least in a simple one. Distances of formulas are made
 // for the inside of their balls.
-INLINE real one_distance(vec point, real reach, __constant const struct Orbit *o, __constant const scalar *k) {
+INLINE real one_distance(vec point, real reach, orbit_record o, constants k) {
     const vec own = solid_own(o, point);
-    if (o->kind != SOLID_FORMULA) {
-        solid_found found;
-        solid_simple(o, own, &found);
-        return found.far;
-    }
+    if (o->kind != SOLID_FORMULA) return simple_far(o, own);
     const vec arm = vec_sub(point, vec_splat(o->ball));
     const real beyond = sqrt(vec_dot(arm, arm)) - (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
     const mask within = less_equal(beyond, R(0.0));
@@ -143,11 +136,11 @@ INLINE real one_distance(vec point, real reach, __constant const struct Orbit *o
     return pick(within, found * scale * (real)(fmin(o->step_scale, S(1.0))), beyond);
 }
 
-INLINE real node_distance(vec point, real reach, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real node_distance(vec point, real reach, orbit_record orbit, constants k) {
     if (!JOINED) return formula_node_distance(point, reach, orbit, k);
     real all = one_distance(point, reach, orbit, k);
     for (int i = 1; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const real more = one_distance(point, reach, o, k);
         if (o->join == JOIN_CUT) all = fmax(all, -more);
         else if (o->join == JOIN_INTERSECTION) all = fmax(all, more);
@@ -158,15 +151,13 @@ INLINE real node_distance(vec point, real reach, __constant const struct Orbit *
 }
 
 // Which nodes lie in one solid as a whole; `outside`: which beside it, of what is cut out.
-INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside, __constant const struct Orbit *o,
-                      __constant const scalar *k) {
+INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside, orbit_record o, constants k) {
     const vec own = solid_own(o, middle);
     const real reach = sqrt(vec_dot(half_side, half_side));
     if (o->kind != SOLID_FORMULA) {
-        solid_found found;
-        solid_simple(o, own, &found);
-        *outside = less(reach, found.far);
-        return candidates & less(found.far, -reach);
+        const real far = simple_far(o, own);
+        *outside = less(reach, far);
+        return candidates & less(far, -reach);
     }
     // The box along the formula's own axes around the node.
     const vec x = vec_splat(o->own_x), y = vec_splat(o->own_y), z = vec_splat(o->own_z);
@@ -179,8 +170,7 @@ INLINE mask one_holds(vec middle, vec half_side, mask candidates, mask *outside,
     return any_lane(held) ? formula_node_inside(own, own_half, held, o, k + o->first) : held;
 }
 
-INLINE mask node_inside(vec middle, vec half_side, mask candidates, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE mask node_inside(vec middle, vec half_side, mask candidates, orbit_record orbit, constants k) {
     if (!JOINED) return formula_node_inside(middle, half_side, candidates, orbit, k);
     mask beside, all = one_holds(middle, half_side, candidates, &beside, orbit, k);
     for (int i = 1; i < orbit->solids; ++i) {

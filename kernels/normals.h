@@ -26,8 +26,7 @@ typedef struct {
 
 INLINE plane_sums plane_none(void) {
     const real zero = R(0.0);
-    const plane_sums s = {zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
-    return s;
+    return (plane_sums){zero, zero, zero, zero, zero, zero, zero, zero, zero, zero};
 }
 
 // The sums with one more point in the lanes where it is found.
@@ -101,21 +100,22 @@ INLINE vec compass_plane(const vec *compass, const mask *found, mask *usable) {
     return plane_normal(sums, &residual, usable);
 }
 
+// Where a normal is not `whole`, that of the plane of the points which are there.
+INLINE vec or_plane(vec normal, mask whole, const vec *compass, const mask *found, mask *usable) {
+    *usable = whole;
+    if (!any_lane(~whole)) return normal;
+    mask planar;
+    const vec plane = compass_plane(compass, found, &planar);
+    *usable = whole | planar;
+    return vec_pick(whole, normal, plane);
+}
+
 // N = (LR - LL) x (U - LL) of the lower corners and the upper middle of a 3 x 3 grid, row-major from the top left. Where one
 // of the three is missing, the plane of those that are there.
 INLINE vec triangle_normal(const vec *compass, const mask *found, mask *usable) {
     mask whole;
     const vec normal = corners_normal(compass[6], compass[8], compass[1], &whole);
-    whole &= found[6] & found[8] & found[1];
-    *usable = whole;
-    vec result = normal;
-    if (any_lane(~whole)) {
-        mask planar;
-        const vec plane = compass_plane(compass, found, &planar);
-        *usable = whole | planar;
-        result = vec_pick(whole, normal, plane);
-    }
-    return result;
+    return or_plane(normal, whole & found[6] & found[8] & found[1], compass, found, usable);
 }
 
 // The eight triangles around the centre (index 4) of a 3 x 3 grid, to the left from the one between upper left and left. One
@@ -140,13 +140,5 @@ INLINE vec eight_mean(const vec *compass, const mask *found, mask *usable) {
         sum = vec_pick(each[i], vec_add(sum, normals[i]), sum);
         some |= each[i];
     }
-    *usable = some;
-    vec result = vec_normalize(sum);
-    if (any_lane(~some)) {
-        mask planar;
-        const vec plane = compass_plane(compass, found, &planar);
-        *usable = some | planar;
-        result = vec_pick(some, result, plane);
-    }
-    return result;
+    return or_plane(vec_normalize(sum), some, compass, found, usable);
 }

@@ -9,7 +9,7 @@
 // The part of a ray in a grid's box: first + number * step, in voxels from the middle of the first one. From one number to the next the
 // way is `voxel` long.
 typedef struct {
-    __global const struct Object *o;
+    object_record o;
     __global const float *tables;
     vec first, step, inverse;   // `inverse` is 1 / step
     mask begins_outside;
@@ -17,14 +17,7 @@ typedef struct {
     real end;                   // the number at `far`
 } grid_ray;
 
-// The numbers of voxels along the axes, by a factor.
-INLINE vec grid_sides(__global const struct Object *o, real factor) {
-    return vec_of((real)((scalar)o->grid_sides[0]) * factor, (real)((scalar)o->grid_sides[1]) * factor,
-                  (real)((scalar)o->grid_sides[2]) * factor);
-}
-
-INLINE grid_ray grid_ray_of(__global const struct Object *o, __global const float *tables, span inside, vec origin, vec direction,
-                            real far) {
+INLINE grid_ray grid_ray_of(object_record o, __global const float *tables, span inside, vec origin, vec direction, real far) {
     grid_ray g;
     const real voxel = (real)(o->voxel);
     g.o = o;
@@ -33,12 +26,12 @@ INLINE grid_ray grid_ray_of(__global const struct Object *o, __global const floa
     g.near = fmax(inside.entry, R(0.0));
     g.far = fmin(inside.exit, far);
     g.end = (g.far - g.near) / voxel;
-    const vec middle = grid_sides(o, R(0.5));
+    const vec middle = vec_scale(vec_of_counts(o->grid_sides), R(0.5));
     // From where the ray enters, so that places have no rounding of the way there.
     const vec begin = vec_sub(vec_along(origin, g.near, direction), vec_splat(o->middle));
     const vec own = object_own(o, begin), way = object_own(o, vec_scale(direction, voxel));
     g.first = vec_of((own.x + R(1.0)) * middle.x - R(0.5), (own.y + R(1.0)) * middle.y - R(0.5), (own.z + R(1.0)) * middle.z - R(0.5));
-    g.step = vec_of(way.x * middle.x, way.y * middle.y, way.z * middle.z);
+    g.step = vec_mul(way, middle);
     g.inverse = vec_of(R(1.0) / divisor(g.step.x), R(1.0) / divisor(g.step.y), R(1.0) / divisor(g.step.z));
     return g;
 }
@@ -56,12 +49,11 @@ INLINE ints cell_of(real place, int count) {
     return to_ints(clamp(from_rim, R(0.0), (real)((scalar)count) + R(0.5))) - 1;
 }
 
-INLINE grid_cell grid_cell_at(vec p, __global const struct Object *o) {
-    const grid_cell c = {cell_of(p.x, o->grid_sides[0]), cell_of(p.y, o->grid_sides[1]), cell_of(p.z, o->grid_sides[2])};
-    return c;
+INLINE grid_cell grid_cell_at(vec p, object_record o) {
+    return (grid_cell){cell_of(p.x, o->grid_sides[0]), cell_of(p.y, o->grid_sides[1]), cell_of(p.z, o->grid_sides[2])};
 }
 
-INLINE ints brick_of(grid_cell c, __global const struct Object *o) {
+INLINE ints brick_of(grid_cell c, object_record o) {
     const int row = (o->grid_sides[0] + 8) >> 3, layer = row * ((o->grid_sides[1] + 8) >> 3);
     return ((c.z + 1) >> 3) * layer + (((c.y + 1) >> 3) * row + ((c.x + 1) >> 3));
 }
@@ -81,7 +73,7 @@ INLINE real grid_cell_end(const grid_ray *g, grid_cell c, mask fine, real number
 }
 
 // The values at a cell's corners, x fastest.
-INLINE void grid_corners(grid_cell c, __global const struct Object *o, __global const float *tables, real *corners) {
+INLINE void grid_corners(grid_cell c, object_record o, __global const float *tables, real *corners) {
     const int row = o->grid_sides[0], layer = row * o->grid_sides[1];
     const ints zero = (ints)(0);
     const ints x0 = max(c.x, zero), x1 = min(c.x + 1, (ints)(row - 1));
@@ -96,14 +88,14 @@ INLINE void grid_corners(grid_cell c, __global const struct Object *o, __global 
 INLINE real between_two(real a, real b, real share) { return a + (b - a) * share; }
 
 // The value at a place.
-INLINE real grid_value(vec p, __global const struct Object *o, __global const float *tables) {
+INLINE real grid_value(vec p, object_record o, __global const float *tables) {
     real v[8];
     const grid_cell c = grid_cell_at(p, o);
     grid_corners(c, o, tables, v);
     const real x = clamp(p.x - to_reals(c.x), R(0.0), R(1.0)), y = clamp(p.y - to_reals(c.y), R(0.0), R(1.0));
     const real z = clamp(p.z - to_reals(c.z), R(0.0), R(1.0));
-    const real low = between_two(between_two(v[0], v[1], x), between_two(v[2], v[3], x), y);
-    return between_two(low, between_two(between_two(v[4], v[5], x), between_two(v[6], v[7], x), y), z);
+    const real low = between(between(v[0], v[1], x), between(v[2], v[3], x), y);
+    return between(low, between(between(v[4], v[5], x), between(v[6], v[7], x), y), z);
 }
 
 // What the value over the level is along a ray in one cell: a polynomial of the third degree, c[0] + r (c[1] + r (c[2] + r c[3])) at r past
@@ -172,7 +164,7 @@ INLINE mask polynomial_root(const real *c, real length, mask inside, mask here, 
 
 // How far along a ray the surface of a volume is, or the largest number: where the value passes the level, or where the box cuts what is
 // above it.
-INLINE real level_met(__global const struct Object *o, __global const float *tables, vec origin, vec direction, real far) {
+INLINE real level_met(object_record o, __global const float *tables, vec origin, vec direction, real far) {
     const span box = object_span(o, origin, direction);
     const grid_ray g = grid_ray_of(o, tables, box, origin, direction, far);
     const real voxel = (real)(o->voxel), level = (real)(o->level);
@@ -212,7 +204,7 @@ INLINE real level_met(__global const struct Object *o, __global const float *tab
 
 // The normal in units of the box, away from larger values: by differences over two voxels, as far as there are any; on a wall of the box
 // that of the wall.
-INLINE vec level_normal(__global const struct Object *o, __global const float *tables, vec own, real slack) {
+INLINE vec level_normal(object_record o, __global const float *tables, vec own, real slack) {
     real rise[3];
     const real place[3] = {own.x, own.y, own.z};
     for (int axis = 0; axis < TURNS(3); ++axis) {
@@ -228,10 +220,6 @@ INLINE vec level_normal(__global const struct Object *o, __global const float *t
         const real apart = at[1] - at[0];
         rise[axis] = pick(less(R(0.0), apart), (side[0] - side[1]) * middle / fmax(apart, R(1e-6)), R(0.0));
     }
-    const real x = fabs(own.x), y = fabs(own.y), z = fabs(own.z);
-    const mask wall = less(R(1.0) - slack, fmax(fmax(x, y), z));
-    const vec n = vec_of(rise[0], rise[1], rise[2]);
-    const mask by_x = less_equal(y, x) & less_equal(z, x), by_y = ~by_x & less_equal(z, y);
-    const vec flat = vec_of(pick(by_x, own.x, R(0.0)), pick(by_y, own.y, R(0.0)), pick(by_x | by_y, R(0.0), own.z));
-    return vec_pick(wall, flat, n);
+    const mask wall = less(R(1.0) - slack, fmax(fmax(fabs(own.x), fabs(own.y)), fabs(own.z)));
+    return vec_pick(wall, box_normal(own), vec_of(rise[0], rise[1], rise[2]));
 }

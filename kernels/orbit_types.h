@@ -2,6 +2,13 @@
 // (solids.h); else a formula by itself, of which nothing is known that is told of the nearest of several.
 #include "numbers/quick.h"
 
+// Does something for each number of a state.
+#if STATE_SIZE == 4
+#define STATE_EACH(DO) DO(s0) DO(s1) DO(s2) DO(s3)
+#else
+#define STATE_EACH(DO) DO(s0) DO(s1) DO(s2)
+#endif
+
 // How an orbit ended.
 typedef struct {
     real count;   // applications until |z| left the radius that counts, or all
@@ -25,9 +32,7 @@ typedef struct {
 } clearance;
 
 // Where a distance is not known.
-INLINE mask is_blind(clearance here) {
-    return JOINED ? less(here.step, here.most) : less(R(1.0), R(0.0));
-}
+INLINE mask is_blind(clearance here) { return JOINED ? less(here.step, here.most) : less(R(1.0), R(0.0)); }
 
 // What is known of a point on the surface, from one orbit over dual numbers.
 typedef struct {
@@ -49,6 +54,4 @@ typedef struct {
 // Whether the work was cancelled. Long orbits test this now and then, or a launch could take arbitrarily long. The host writes
 // the record while kernels run; they see it if both share their memory. The results of a cancelled launch are discarded.
 #define ORBIT_LOOK 4096
-INLINE int orbit_cancelled(__constant const struct Orbit *orbit) {
-    return *(volatile __constant const int *)&orbit->cancelled;
-}
+INLINE int orbit_cancelled(orbit_record orbit) { return *(volatile __constant const int *)&orbit->cancelled; }

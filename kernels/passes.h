@@ -11,7 +11,7 @@ typedef struct {
     __global scalar *kept;          // [tile][number of a pixel][packet][lane]
     __global uint *statistics;      // [tile of the launch][packet][STATISTICS]
     __global const int4 *places;    // of each tile: its top left pixel, x and y; its number in `kept`
-    __constant const struct View *view;
+    view_record view;
     __constant const struct Sampling *sampling;
     __global const int *slots;      // places of channels in the film, then of a pixel's numbers in `kept`; -1: not wanted
     int channel_count, kept_count;
@@ -24,33 +24,21 @@ typedef struct {
 INLINE void kept_number(__global scalar *kept, __global const int *slots, int number, int write, real *value) {
     if (slots[number] < 0) return;
     __global scalar *at = kept + slots[number] * TILE_PIXELS;
-    scalar each[LANES];
-    if (write) {
-        lanes_store(*value, each);
-        for (int lane = 0; lane < LANES; ++lane) at[lane] = each[lane];
-    } else {
-        for (int lane = 0; lane < LANES; ++lane) each[lane] = at[lane];
-        *value = lanes_load(each);
+    if (write) lanes_store(*value, at);
+    else *value = lanes_load(at);
+}
+
+// All numbers of a struct, from the kept number `first` on: KEPT numbers them in the order of `pixel`, `parts` and `mattes`.
+#define KEPT_NUMBER(i) kept_number(kept, slots, first + i, write, numbers + i);
+#define KEPT_NUMBERS(name, type, begins)                                                                                   \
+    INLINE void name(__global scalar *kept, __global const int *slots, int write, type *sums) {                            \
+        real *numbers = (real *)sums;                                                                                      \
+        const int first = begins;                                                                                          \
+        FOR_NUMBERS(NUMBERS_OF(type), KEPT_NUMBER)                                                                         \
     }
-}
-
-// All of them; KEPT numbers them in the order of `pixel`.
-INLINE void kept_pixel(__global scalar *kept, __global const int *slots, int write, pixel *p) {
-#define KEPT_NUMBER(i) kept_number(kept, slots, i, write, (real *)p + i);
-    FOR_NUMBERS(NUMBERS_OF(pixel), KEPT_NUMBER)
-}
-
-// Likewise; their numbers follow those of `pixel`.
-INLINE void kept_parts(__global scalar *kept, __global const int *slots, int write, parts *sum) {
-#define KEPT_PART(i) kept_number(kept, slots, NUMBERS_OF(pixel) + i, write, (real *)sum + i);
-    FOR_NUMBERS(NUMBERS_OF(parts), KEPT_PART)
-}
-
-// And these; see `KEPT`.
-INLINE void kept_mattes(__global scalar *kept, __global const int *slots, int write, mattes *sum) {
-#define KEPT_MATTE(i) kept_number(kept, slots, KEPT_MATTE_0 + i, write, (real *)sum + i);
-    FOR_NUMBERS(NUMBERS_OF(mattes), KEPT_MATTE)
-}
+KEPT_NUMBERS(kept_pixel, pixel, 0)
+KEPT_NUMBERS(kept_parts, parts, NUMBERS_OF(pixel))
+KEPT_NUMBERS(kept_mattes, mattes, KEPT_MATTE_0)
 
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
 typedef struct {
@@ -62,10 +50,9 @@ typedef struct {
 
 INLINE place_in_pass place_of_packet(pass s, int packet, int tile) {
     const int4 corner = s.places[tile];
-    const place_in_pass here = {tile, packet, packet_at(packet, (int2)(corner.x, corner.y), s.view),
+    return (place_in_pass){tile, packet, packet_at(packet, (int2)(corner.x, corner.y), s.view),
                                 s.kept + corner.z * s.kept_count * TILE_PIXELS + packet * LANES,
                                 s.statistics + STATISTICS * (tile * (TILE_PIXELS / LANES) + packet)};
-    return here;
 }
 
 // What the packet's pixels had before this pass.
@@ -108,9 +95,7 @@ INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
 }
 
 // Sets the count to which marches add the lanes that wait: once in a launch, unless it continues the one before.
-INLINE void count_waits_from(pass s, const place_in_pass *here) {
-    if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u;
-}
+INLINE void count_waits_from(pass s, const place_in_pass *here) { if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u; }
 
 // Counts what the launch has done for the packet, or adds to what was counted.
 INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, tally cost) {

@@ -6,16 +6,13 @@
 
 // Sends the rays of a pixel's points, from where its cone touched.
 STAGE(send_points) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
     queue of_set = s.q;
     of_set.objects = 0;
     const encounter end_of_cone = queue_met(of_set, 0, s.slot);
-    tally cost;
-    STATE_RECALL(s, cost, STATE_TALLY);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
     tally_met(&cost, end_of_cone, 0);
     cost.bad += end_of_cone.bad;
     const touch touched = {end_of_cone.hit, end_of_cone.t};
@@ -26,15 +23,11 @@ STAGE(send_points) {
 
 // Makes spots of what a pixel's points have met, in the place of `find_spots`.
 STAGE(join_points) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
-    tally cost;
-    touch touched;
-    STATE_RECALL(s, cost, STATE_TALLY);
-    STATE_RECALL(s, touched, STATE_TOUCH);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, touch, touched, STATE_TOUCH);
     sighting at_first = {R(0.0), cost.steps};
     const ray r = eye_ray(&a, view);
     pixel_points points = points_begin(r, a.time, touched, points_seed(&here.at, sample, w), w);

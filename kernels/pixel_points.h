@@ -26,26 +26,13 @@ INLINE bits points_seed(const packet_pixels *at, int sample, world w) {
 }
 
 INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits seed, world w) {
-    pixel_points p;
-    p.seed = seed;
-    p.cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
-    p.count = R(0.0);
-    p.nearest = (real)(REAL_LARGEST);
-    p.point = pixel_ray.origin;
-    p.base = pixel_ray.origin;
-    p.normal = pixel_ray.direction;
-    p.smooth = p.object = p.other = p.share = R(0.0);
-    p.tint = color_of(R(0.0), R(0.0), R(0.0));
-    p.reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction);
-    p.toward = vec_scale(pixel_ray.direction, R(-1.0));
+    pixel_points p = {.seed = seed, .cone = pixel_ray.footprint + pixel_ray.spread * touched.t, .nearest = (real)(REAL_LARGEST),
+                      .point = pixel_ray.origin, .base = pixel_ray.origin, .normal = pixel_ray.direction,
+                      .reference = vec_along(pixel_ray.origin, touched.t, pixel_ray.direction),
+                      .toward = vec_scale(pixel_ray.direction, R(-1.0)), .sums = plane_none()};
     const vec side = VIEW_VEC(w.view, side, time);
     p.right = vec_normalize(vec_along(side, -vec_dot(side, p.toward), p.toward));
     p.up = vec_cross(p.toward, p.right);
-    p.sums = plane_none();
-    for (int i = 0; i < TURNS(9); ++i) {
-        p.compass[i] = vec_of(R(0.0), R(0.0), R(0.0));
-        p.compass_found[i] = less(R(1.0), R(0.0));
-    }
     return p;
 }
 
@@ -130,21 +117,11 @@ INLINE void points_triangles(stage s, const pixel_points *p, vec instead) {
 // squares, or else that of the middle one.
 INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     const real share = R(1.0) / fmax(p->count, R(1.0));
-    spot here;
-    here.found = number_of(less(R(0.0), p->count));
-    here.point = p->base;
-    here.seen = p->point;
-    here.smooth = p->smooth;
-    here.object = p->object;
-    here.other = p->other;
-    here.share = p->share;
-    here.cone = p->cone;
-    here.tint = color_scale(p->tint, share);
+    spot here = {.found = number_of(less(R(0.0), p->count)), .point = p->base, .seen = p->point, .normal = p->normal,
+                 .smooth = p->smooth, .object = p->object, .other = p->other, .share = p->share, .cone = p->cone,
+                 .tint = color_scale(p->tint, share), .residual = R(0.0), .quantity = R(0.0)};
     // (Of the set it is found later; that of a cut object's face only here.)
     if (!is_colored_at_once(w.material)) here.tint = spot_color(p->normal, p->smooth, p->object, p->other, p->share, w);
-    here.normal = p->normal;
-    here.residual = R(0.0);
-    here.quantity = R(0.0);
     mask usable = less(R(1.0), R(0.0));
     if (w.settings->geometric) {
         real residual;

@@ -3,11 +3,11 @@
 //
 // Each cuts the set, or objects beside it, or both.
 typedef struct {
-    __global const struct CutPlane *planes;
-    __constant const struct Orbit *orbits;
-    __constant const scalar *k;
+    plane_record planes;
+    orbit_record orbits;
+    constants k;
     __global const float *palettes;   // PALETTE_SIZE colours for each plane
-    __global const struct Object *objects;
+    object_record objects;
     int count;
 } plane_set;
 
@@ -17,7 +17,6 @@ typedef struct {
 #define MOST_OBJECTS 64
 
 INLINE real face_number(real plane, real object) { return (plane + R(1.0)) * FACE_OF_PLANE + object; }
-
 INLINE mask is_face(real thing) { return less_equal(FACE_OF_PLANE, thing); }
 
 // Of a face the plane, from 0; of all else -1.
@@ -27,7 +26,7 @@ INLINE real plane_of_face(real thing) { return pick(is_face(thing), floor(thing 
 INLINE real thing_cut(real thing) { return pick(is_face(thing), thing - floor(thing / FACE_OF_PLANE) * FACE_OF_PLANE, thing); }
 
 // Cuts a part of a ray's line to what is behind a plane. `face`: the plane at which it begins, which may now be this one.
-INLINE void plane_cut(__global const struct CutPlane *plane, int i, vec origin, vec direction, real *near, real *far, real *face) {
+INLINE void plane_cut(plane_record plane, int i, vec origin, vec direction, real *near, real *far, real *face) {
     const vec normal = vec_splat(plane->normal);
     const real height = vec_dot(vec_sub(origin, vec_splat(plane->center)), normal);
     const real climb = vec_dot(direction, normal);
@@ -40,7 +39,7 @@ INLINE void plane_cut(__global const struct CutPlane *plane, int i, vec origin, 
 }
 
 // A place that a ray has met on a plane, without the rounding of the way there.
-INLINE vec place_on_plane(__global const struct CutPlane *plane, vec point) {
+INLINE vec place_on_plane(plane_record plane, vec point) {
     const vec normal = vec_splat(plane->normal);
     return vec_along(point, -vec_dot(vec_sub(point, vec_splat(plane->center)), normal), normal);
 }
@@ -56,4 +55,4 @@ INLINE mask planes_cut(ray *r, real *face, plane_set set) {
 }
 
 // Whether a plane cuts the object with this index.
-INLINE int plane_cuts(__global const struct CutPlane *plane, int object) { return plane->objects[object / 32] >> (object % 32) & 1; }
+INLINE int plane_cuts(plane_record plane, int object) { return plane->objects[object / 32] >> (object % 32) & 1; }

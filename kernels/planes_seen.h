@@ -2,7 +2,7 @@
 //   mask cut_objects_hold(int plane, vec point, plane_set set), whether a place is inside an object that a plane cuts.
 
 // Where the formula is evaluated for a point of the picture: elsewhere if a volume is zoomed.
-INLINE vec plane_place(vec point, __global const struct CutPlane *plane) {
+INLINE vec plane_place(vec point, plane_record plane) {
     return vec_along(vec_splat(plane->zoom_origin), (real)(plane->zoom), point);
 }
 
@@ -43,14 +43,13 @@ typedef struct {
 } plane_hit;
 
 // How far along a ray of the picture a quad is met; the largest number where it is not.
-INLINE real quad_distance(ray r, __global const struct CutPlane *plane, mask active) {
+INLINE real quad_distance(ray r, plane_record plane, mask active) {
     const vec normal = vec_splat(plane->normal);
     const real climb = vec_dot(r.direction, normal);
     const vec offset = vec_sub(vec_splat(plane->center), r.origin);
     const real t = vec_dot(offset, normal) / pick(equal(climb, R(0.0)), (real)(REAL_SMALLEST), climb);
     const vec there = vec_sub(vec_scale(r.direction, t), offset);
-    const mask met = active & less(R(0.0), t) &
-                     less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
+    const mask met = active & less(R(0.0), t) & less(fabs(vec_dot(there, vec_splat(plane->side))), (real)(plane->half_width)) &
                      less(fabs(vec_dot(there, vec_splat(plane->up))), (real)(plane->half_height)) &
                      less(R(0.0), (real)(fmax(plane->opacity, plane->inside_opacity)));
     return pick(met, t, (real)(REAL_LARGEST));
@@ -68,7 +67,7 @@ CALLED plane_hit planes_next(const ray *r, real before, real after, mask active,
         next.index = pick(nearer, index, next.index);
     }
     for (int i = 0; i < set.count; ++i) {
-        __global const struct CutPlane *plane = set.planes + i;
+        plane_record plane = set.planes + i;
         const mask here = equal(next.index, (real)((scalar)i));
         if (!any_lane(here)) continue;
         const escaped e = plane_look(vec_along(r->origin, next.distance, r->direction), here, i, set);
@@ -83,14 +82,8 @@ CALLED plane_hit planes_next(const ray *r, real before, real after, mask active,
 // The quads along a ray of the picture, in front of and behind distance `object` (the largest number where nothing was hit).
 // `hidden`: the plane whose quad is behind it though it is at this very distance, or -1.
 INLINE plane_layers planes_seen(ray r, real object, real hidden, mask active, plane_set set) {
-    plane_layers layers;
-    layers.front = color_of(R(0.0), R(0.0), R(0.0));
-    layers.behind = layers.front;
-    layers.front_through = R(1.0);
-    layers.behind_through = R(1.0);
-    layers.nearest = (real)(REAL_LARGEST);
-    layers.normal = vec_scale(r.direction, R(-1.0));
-    layers.count = R(0.0);
+    plane_layers layers = {.front_through = R(1.0), .behind_through = R(1.0), .nearest = (real)(REAL_LARGEST),
+                           .normal = vec_scale(r.direction, R(-1.0))};
     real before = R(-1.0), after = R(-1.0);
     for (int pass = 0; pass < set.count; ++pass) {
         const plane_hit next = planes_next(&r, before, after, active, set);

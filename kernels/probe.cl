@@ -36,34 +36,24 @@ __kernel void escape_counts(__global scalar *counts, int width, int limit) {
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(x * x + y * y + z * z, R(4.0));
     }
-    scalar each[LANES];
-    lanes_store(count, each);
-    for (int lane = 0; lane < LANES; ++lane) counts[first + lane] = each[lane];
+    lanes_store(count, counts + first);
 }
 
 __kernel void built_ins(__global scalar *sums, __global const scalar *arguments) {
     const int first = (int)get_global_id(0) * LANES;
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = arguments[first + lane];
-    const real t = lanes_load(each);  // between 0 and 1
+    const real t = lanes_load(arguments + first);  // between 0 and 1
     real sum = sqrt(t) + exp(t) + log(t + R(0.5)) + exp2(t) + log2(t + R(0.5)) + sin(t) + cos(t) + tan(t);
     sum += asin(t) + acos(t) + atan(t) + atan2(t, R(0.7)) + pow(t + R(0.5), R(1.7)) + floor(t * R(8.0)) + fabs(t - R(0.5));
     sum += fmin(t, R(0.4)) + fmax(t, R(0.6)) + clamp(t, R(0.3), R(0.7));
     sum += pick(less(t, R(0.5)), R(1.0), R(2.0)) + pick(equal(t, t) & ~is_nan(t), R(4.0), R(8.0));
-    lanes_store(sum, each);
-    for (int lane = 0; lane < LANES; ++lane) sums[first + lane] = each[lane];
+    lanes_store(sum, sums + first);
 }
 
 __kernel void mixed_lanes(__global scalar *values, __global const scalar *arguments, int count) {
     const int first = (int)get_global_id(0) * LANES;
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = arguments[first + lane];
-    const real t = lanes_load(each);
+    const real t = lanes_load(arguments + first);
     const real results[4] = {sin(t), cos(t), pow(fabs(t), R(1.7)), log(fabs(t))};
-    for (int function = 0; function < 4; ++function) {
-        lanes_store(results[function], each);
-        for (int lane = 0; lane < LANES; ++lane) values[function * count + first + lane] = each[lane];
-    }
+    for (int function = 0; function < 4; ++function) lanes_store(results[function], values + function * count + first);
 }
 
 typedef struct {
@@ -71,8 +61,7 @@ typedef struct {
 } probe_state;
 
 INLINE probe_state probe_apply(probe_state z, probe_state c) {
-    const probe_state next = {z.x * z.x - z.y * z.y + c.x, R(2.0) * z.x * z.y + c.y};
-    return next;
+    return (probe_state){z.x * z.x - z.y * z.y + c.x, R(2.0) * z.x * z.y + c.y};
 }
 
 // Whether points of the plane of the Mandelbrot set are still within |z| <= 2 after `limit` applications, a multiple of 4.
@@ -98,9 +87,5 @@ __kernel void side_by_side(__global scalar *inside, int width, int limit) {
         }
         open = alive[0] | alive[1];
     }
-    for (int p = 0; p < TURNS(2); ++p) {
-        scalar each[LANES];
-        lanes_store(pick(alive[p], R(1.0), R(0.0)), each);
-        for (int lane = 0; lane < LANES; ++lane) inside[first + p * LANES + lane] = each[lane];
-    }
+    for (int p = 0; p < TURNS(2); ++p) lanes_store(pick(alive[p], R(1.0), R(0.0)), inside + first + p * LANES);
 }

@@ -16,6 +16,7 @@ typedef struct {
     real solid;                    // the number of the object that the surface belongs to, or 0
     real other, part;              // where two flow together: likewise of the other one, and its part of the colour
 } encounter;
+NUMBERS_PICKED(encounter)
 
 // Places of numbers in these structs.
 #define RAY_NEAR 6

@@ -12,20 +12,13 @@ typedef struct {
 } seen_rectangle;
 
 INLINE seen_rectangle rectangle_between(real left, real right, real lower, real upper, real height) {
-    seen_rectangle r;
-    r.left = left;
-    r.right = right;
-    r.lower = lower;
-    r.upper = upper;
-    r.height = height;
     // Of the planes through the point and a side: the part of their normals that is across the rectangle.
-    const real square = r.height * r.height;
-    r.below = -r.lower / sqrt(r.lower * r.lower + square);
-    r.above = r.upper / sqrt(r.upper * r.upper + square);
-    const real at_right = r.right / sqrt(r.right * r.right + square), at_left = -r.left / sqrt(r.left * r.left + square);
-    r.turned = R(2.0) * LIGHT_PI - real_acos(-r.above * at_left) - real_acos(-at_left * r.below);
-    r.angle = real_acos(-r.below * at_right) + real_acos(-at_right * r.above) - r.turned;
-    return r;
+    const real square = height * height;
+    const real below = -lower / sqrt(lower * lower + square), above = upper / sqrt(upper * upper + square);
+    const real at_right = right / sqrt(right * right + square), at_left = -left / sqrt(left * left + square);
+    const real turned = R(2.0) * LIGHT_PI - real_acos(-above * at_left) - real_acos(-at_left * below);
+    const real angle = real_acos(-below * at_right) + real_acos(-at_right * above) - turned;
+    return (seen_rectangle){left, right, lower, upper, height, angle, below, above, turned};
 }
 
 // A place of it; z is its height.
@@ -61,7 +54,7 @@ typedef struct {
     seen_rectangle seen;
 } light_rectangle;
 
-INLINE light_rectangle rectangle_seen(__constant const struct Light *light, vec point) {
+INLINE light_rectangle rectangle_seen(light_record light, vec point) {
     light_rectangle r;
     const vec side = vec_splat(light->side), upward = vec_splat(light->upward), offset = vec_sub(vec_splat(light->vector), point);
     const real wide = sqrt(vec_dot(side, side)), high = sqrt(vec_dot(upward, upward));
@@ -74,14 +67,14 @@ INLINE light_rectangle rectangle_seen(__constant const struct Light *light, vec 
     return r;
 }
 
-INLINE vec rectangle_direction(__constant const struct Light *light, vec point, real u, real v) {
+INLINE vec rectangle_direction(light_record light, vec point, real u, real v) {
     const light_rectangle r = rectangle_seen(light, point);
     const vec place = rectangle_place(&r.seen, u, v);
     return vec_normalize(vec_along(vec_along(vec_scale(r.toward, place.z), place.x, r.side), place.y, r.upward));
 }
 
 // Per steradian, of `rectangle_direction`, for a direction that meets the rectangle.
-INLINE real rectangle_density(__constant const struct Light *light, vec point, vec direction) {
+INLINE real rectangle_density(light_record light, vec point, vec direction) {
     const light_rectangle r = rectangle_seen(light, point);
     return rectangle_place_density(&r.seen, (real)(light->area), vec_dot(direction, r.toward));
 }

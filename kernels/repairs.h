@@ -15,26 +15,16 @@ INLINE real normal_pow(real x, real y) { return pow(pick(less(fabs(x), (real)(RE
 // others come out wrong (sin(1e-10) = 0.0134 for float4 to float16). Far lanes are evaluated among themselves.
 INLINE mask far_lanes(real a) { return ~less_equal(fabs(a), R(1e5)); }
 
-INLINE real packet_sin(real a) {
-    const mask far = far_lanes(a);
-    const real near = sin(pick(far, R(0.0), a));
-    if (!any_lane(far)) return near;
-    return pick(far, sin(pick(far, a, R(1e6))), near);
-}
-
-INLINE real packet_cos(real a) {
-    const mask far = far_lanes(a);
-    const real near = cos(pick(far, R(0.0), a));
-    if (!any_lane(far)) return near;
-    return pick(far, cos(pick(far, a, R(1e6))), near);
-}
-
-INLINE real packet_tan(real a) {
-    const mask far = far_lanes(a);
-    const real near = tan(pick(far, R(0.0), a));
-    if (!any_lane(far)) return near;
-    return pick(far, tan(pick(far, a, R(1e6))), near);
-}
+#define APART_WHERE_FAR(name, function)                                        \
+    INLINE real name(real a) {                                                 \
+        const mask far = far_lanes(a);                                         \
+        const real near = function(pick(far, R(0.0), a));                      \
+        if (!any_lane(far)) return near;                                       \
+        return pick(far, function(pick(far, a, R(1e6))), near);                \
+    }
+APART_WHERE_FAR(packet_sin, sin)
+APART_WHERE_FAR(packet_cos, cos)
+APART_WHERE_FAR(packet_tan, tan)
 
 // Some drivers' own built-ins are macros.
 #undef sin

@@ -23,28 +23,13 @@ typedef JOIN(uint, LANES) bits;
 #endif
 
 // Purposes: independent sequences of the same pixel. Lights are numbered from PURPOSE_LIGHT on.
-#define PURPOSE_PIXEL 0u
-#define PURPOSE_POINTS 1u
-#define PURPOSE_LENS 2u
-#define PURPOSE_AMBIENT 3u
-#define PURPOSE_ENVIRONMENT 4u
-#define PURPOSE_LIGHT 5u
-#define PURPOSE_ASK 6u
-#define PURPOSE_CHOICE 7u
-#define PURPOSE_SCATTER 8u
-#define PURPOSE_CHOICES 9u
-#define PURPOSE_AIR 10u
-#define PURPOSE_WAVE 11u
-#define PURPOSE_FLIGHT 12u
-#define PURPOSE_GLOW 13u
-#define PURPOSE_SET_LIGHT 14u
-#define PURPOSE_WALL 15u
+enum {
+    PURPOSE_PIXEL, PURPOSE_POINTS, PURPOSE_LENS, PURPOSE_AMBIENT, PURPOSE_ENVIRONMENT, PURPOSE_LIGHT, PURPOSE_ASK, PURPOSE_CHOICE,
+    PURPOSE_SCATTER, PURPOSE_CHOICES, PURPOSE_AIR, PURPOSE_WAVE, PURPOSE_FLIGHT, PURPOSE_GLOW, PURPOSE_SET_LIGHT, PURPOSE_WALL
+};
 #define PURPOSE_TIME 0xffffffffu
 
-#define FILTER_BOX 0
-#define FILTER_TENT 1
-#define FILTER_BLACKMAN_HARRIS 2
-
+enum { FILTER_BOX, FILTER_TENT, FILTER_BLACKMAN_HARRIS };
 
 // Integer hash with full avalanche (the finaliser of MurmurHash3, Appleby 2011).
 INLINE bits hash_bits(bits a) {

@@ -1,22 +1,8 @@
 // Entry points that know the formula: the cut planes in a picture, where they are visible.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
-#include "camera.h"
-#include "sampling.h"
-#include "shade.h"
-#include "tiles.h"
-#include "pixel.h"
+#include "orbits.h"
+#include "stages.h"
 #include "escape.h"
 #include "escape_colors.h"
-#include "planes.h"
-#include "stage.h"
-#include "state.h"
-#include "eye.h"
 
 // Whether a place is inside an object that a plane cuts.
 INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
@@ -31,19 +17,13 @@ INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
 // Finds where a plane opens the set on the ray that was sent for the next spot: there its face is met, and no ray goes on. (Of objects
 // beside the set stages know that by themselves, see `surface_met`.)
 STAGE(find_faces) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     real from;
-    plane_face face;
     const mask left = planes_cut(&r, &from, w.planes) & mask_of(so_far.on_path);
-    face.t = r.near;
-    face.count = R(0.0);
-    face.tint = color_of(R(0.0), R(0.0), R(0.0));
-    face.normal = vec_of(R(0.0), R(0.0), R(0.0));
+    plane_face face = {.t = r.near};
     mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
     if (s.q.objects) bare &= less(face.t, lanes_load(s.q.rays + RAY_OBJECT * s.q.stride + s.slot));
     face.number = pick(bare, face_number(from, R(0.0)), R(0.0));
@@ -55,9 +35,7 @@ STAGE(find_faces) {
 // Finds the planes in front of and behind the first spots. Along paths faces have light, and quads have none: there a face hides the
 // part of its own quad that is at the same place.
 STAGE(find_planes) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
     const spot found = spot_kept(s, 0);
     const ray r = eye_ray(&a, view);

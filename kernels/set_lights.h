@@ -37,11 +37,9 @@ INLINE int set_row(scalar x, scalar y, scalar z, world w) {
 }
 
 INLINE void set_rows(vec point, world w, int *rows) {
-    scalar x[LANES], y[LANES], z[LANES];
-    lanes_store(point.x, x);
-    lanes_store(point.y, y);
-    lanes_store(point.z, z);
-    for (int lane = 0; lane < LANES; ++lane) rows[lane] = set_row(x[lane], y[lane], z[lane], w);
+    scalar at[3][LANES];
+    vec_store(point, at);
+    for (int lane = 0; lane < LANES; ++lane) rows[lane] = set_row(at[0][lane], at[1][lane], at[2][lane], w);
 }
 
 // About the irradiance that all balls together can bring to a point.
@@ -195,12 +193,8 @@ INLINE int set_walk(const scalar *o, const scalar *d, int of_eye, scalar *far, w
 // it reckon with: that of a place which asks for this ball alone. Whatever they reckon with, they add up to 1 (Veach 1997, sec. 9.2).
 CALLED mask set_met(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     scalar o[3][LANES], d[3][LANES], reach[LANES], found[LANES];
-    lanes_store(origin->x, o[0]);
-    lanes_store(origin->y, o[1]);
-    lanes_store(origin->z, o[2]);
-    lanes_store(direction->x, d[0]);
-    lanes_store(direction->y, d[1]);
-    lanes_store(direction->z, d[2]);
+    vec_store(*origin, o);
+    vec_store(*direction, d);
     lanes_store(*far, reach);
     for (int lane = 0; lane < LANES; ++lane) {
         const scalar from[3] = {o[0][lane], o[1][lane], o[2][lane]}, way[3] = {d[0][lane], d[1][lane], d[2][lane]};

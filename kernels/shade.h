@@ -10,24 +10,17 @@ typedef struct {
     real strength;   // intensity after falloff
 } incidence;
 
-INLINE incidence light_from_middle(__constant const struct Light *light, vec point) {
-    incidence in;
-    in.strength = (real)(light->intensity);
-    if (light->kind == LIGHT_DIRECTIONAL) {
-        in.toward = vec_scale(vec_splat(light->vector), R(-1.0));
-        in.distance = (real)(REAL_LARGEST);
-    } else {
-        const vec offset = vec_sub(vec_splat(light->vector), point);
-        const real square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
-        in.toward = vec_normalize(offset);
-        in.distance = sqrt(square);
-        if (light->inverse_square) in.strength /= square;
-    }
-    return in;
+INLINE incidence light_from_middle(light_record light, vec point) {
+    const vec vector = vec_splat(light->vector);
+    const real bright = (real)(light->intensity);
+    if (light->kind == LIGHT_DIRECTIONAL) return (incidence){vec_scale(vector, R(-1.0)), (real)(REAL_LARGEST), bright};
+    const vec offset = vec_sub(vector, point);
+    const real square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
+    return (incidence){vec_normalize(offset), sqrt(square), light->inverse_square ? bright / square : bright};
 }
 
 // What a point shows of a light whose middle lies that far: a spot's cone, a ball's or a rectangle's size.
-INLINE real light_shape(__constant const struct Light *light, vec toward, real square) {
+INLINE real light_shape(light_record light, vec toward, real square) {
     const vec axis = vec_splat(light->axis);
     const real along = -vec_dot(toward, axis);
     if (light->kind == LIGHT_SPHERE) return least((real)(light->radius * light->radius) / square, R(1.0));
@@ -43,7 +36,7 @@ INLINE real light_shape(__constant const struct Light *light, vec toward, real s
     return t * t * (R(3.0) - R(2.0) * t);
 }
 
-INLINE incidence light_at(__constant const struct Light *light, vec point) {
+INLINE incidence light_at(light_record light, vec point) {
     incidence in = light_from_middle(light, point);
     if (light->kind >= LIGHT_SPOT) in.strength *= light_shape(light, in.toward, in.distance * in.distance);
     return in;
@@ -69,18 +62,15 @@ typedef struct {
 } attitude;
 
 INLINE attitude attitude_to(incidence in, vec normal, vec to_viewer, mask lit) {
-    attitude a;
-    a.facing = vec_dot(normal, in.toward);
-    a.front = lit & less(R(0.0), a.facing);
-    const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * a.facing), in.toward);
-    a.toward_viewer = fmax(vec_dot(mirrored, to_viewer), R(0.0));
-    return a;
+    const real facing = vec_dot(normal, in.toward);
+    const vec mirrored = vec_sub(vec_scale(normal, R(2.0) * facing), in.toward);
+    return (attitude){facing, fmax(vec_dot(mirrored, to_viewer), R(0.0)), lit & less(R(0.0), facing)};
 }
 
 // The light that one light adds. `lit` is s of Eq. 5; `open` is the unblocked part of the hemisphere, a factor on the ambient part;
 // `to_viewer` has length 1.
 INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask lit, real open,
-                   __constant const struct Light *light, __constant const struct Material *material) {
+                   light_record light, material_record material) {
     const attitude a = attitude_to(in, normal, to_viewer, lit);
     const real diffuse = pick(a.front, (real)(material->diffuse) * a.facing, R(0.0));
     const real highlight = (real)(material->specular) * highlight_of(a.toward_viewer, material->shininess);
@@ -92,16 +82,15 @@ INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask 
 }
 
 // Where coloring.h's quantity lies in the palette, 0 to 1.
-INLINE real palette_place(real quantity, __constant const struct Material *material) {
+INLINE real palette_place(real quantity, material_record material) {
     return place_in_palette(quantity, material->palette_scale, material->palette_offset, material->palette_repeat);
 }
 
 // Whether a point's colour is known as soon as it is met: else one quantity chooses that of all a pixel's points.
-INLINE int is_colored_at_once(__constant const struct Material *material) { return material->coloring <= COLORING_ITERATIONS; }
+INLINE int is_colored_at_once(material_record material) { return material->coloring <= COLORING_ITERATIONS; }
 
 // The surface's own colour M; `quantity` is that of coloring.h.
-INLINE color surface_color(vec normal, real quantity, __constant const struct Material *material,
-                           __global const float *palette) {
+INLINE color surface_color(vec normal, real quantity, material_record material, __global const float *palette) {
     if (material->coloring == COLORING_SOLID) return color_splat(material->color);
     // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
     if (material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));

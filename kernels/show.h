@@ -49,20 +49,12 @@ __kernel void diffuse(__global const float4 *colors, __constant const struct Sho
     float4 sum = (float4)(0.0f);
     if (is_light(own)) {
         const float beside = 0.0625f * view->smoothing, corner = 0.03125f * view->smoothing;
-        const int left = x > 0, right = x < width - 1;
-        if (y > 0) {
-            __global const float4 *above = here - width;
-            if (left) sum += gained(own, above[-1], corner);
-            sum += gained(own, above[0], beside);
-            if (right) sum += gained(own, above[1], corner);
-        }
-        if (left) sum += gained(own, here[-1], beside);
-        if (right) sum += gained(own, here[1], beside);
-        if (y < height - 1) {
-            __global const float4 *below = here + width;
-            if (left) sum += gained(own, below[-1], corner);
-            sum += gained(own, below[0], beside);
-            if (right) sum += gained(own, below[1], corner);
+        for (int down = -1; down <= 1; ++down) {
+            for (int right = -1; right <= 1; ++right) {
+                const int there = x + right >= 0 && x + right < width && y + down >= 0 && y + down < height;
+                if (!there || (down == 0 && right == 0)) continue;
+                sum += gained(own, here[down * width + right], down != 0 && right != 0 ? corner : beside);
+            }
         }
     }
     smoothed[here - colors] = (float4)(own.x + sum.x, own.y + sum.y, own.z + sum.z, own.w);
@@ -187,6 +179,5 @@ uchar4 shown_at(__global const float4 *colors, __constant const struct ShownView
         found.z += seen;
     }
     const int threshold = threshold_at(x & 15, y & 15);
-    return (uchar4)(coded(found.x, table, threshold), coded(found.y, table, threshold),
-                    coded(found.z, table, threshold), 255);
+    return (uchar4)(coded(found.x, table, threshold), coded(found.y, table, threshold), coded(found.z, table, threshold), 255);
 }

@@ -1,5 +1,5 @@
 // Smooth escape counts as `formula_dual_distance` and `formula_smooth_count` find them, without derivatives; and which points are inside.
-INLINE real formula_count(vec point, mask *within, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real formula_count(vec point, mask *within, orbit_record orbit, constants k) {
     state c, z;
     start(point, k, &c, &z);
     surface_point end;
@@ -31,22 +31,17 @@ INLINE real formula_count(vec point, mask *within, __constant const struct Orbit
 // Counts of several solids that are joined: the largest of those that are beside each other, the
 // smaller of both where only what they have in common is left. A simple solid has the iteration limit inside, and 0 outside. What is
 // cut out has counts of 0, and does not change others.
-INLINE real solid_count(vec point, mask *within, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real solid_count(vec point, mask *within, orbit_record orbit, constants k) {
     if (!JOINED) return formula_count(point, within, orbit, k);
     const real most = (real)((scalar)orbit->iterations);
     real all = R(0.0);
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const vec own = solid_own(o, point);
         real count = R(0.0);
         mask inside;
-        if (o->kind != SOLID_FORMULA) {
-            solid_found found;
-            solid_simple(o, own, &found);
-            inside = found.inside;
-        } else {
-            count = formula_count(own, &inside, o, k + o->first);
-        }
+        if (o->kind != SOLID_FORMULA) inside = simple_holds(o, own);
+        else count = formula_count(own, &inside, o, k + o->first);
         // Each formula has a limit of its own.
         count = pick(inside, most, fmin(count, most));
         if (o->join == JOIN_CUT) all = pick(inside, R(0.0), all);

@@ -5,10 +5,9 @@
 
 // The square of how far apart two states are, where orbits may come back.
 INLINE real apart_square(state z, state past) {
-    state apart = {z.s0 - past.s0, z.s1 - past.s1, z.s2 - past.s2};
-#if STATE_SIZE == 4
-    apart.s3 = z.s3 - past.s3;
-#endif
+    state apart;
+#define APART(s) apart.s = z.s - past.s;
+    STATE_EACH(APART)
     return state_square(apart);
 }
 
@@ -17,7 +16,7 @@ INLINE real apart_square(state z, state past) {
 // renewed at powers of two). Packets are tested every few applications, and lanes that escaped continue without effect. One
 // lane ends at once, and has neither arrays nor loops of a constant count (see TURNS in lanes.h).
 #if LANES == 1
-INLINE void orbits_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
     const real farthest = orbit->distance_square;
     const int limit = orbit->iterations;
     state c, z;
@@ -45,7 +44,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, __constant const stru
     inside[0] = alive & settled(square, orbit);
 }
 #else
-INLINE void orbits_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
     const mask all_lanes = equal(R(0.0), R(0.0));
     const real farthest = (real)(orbit->distance_square);
     const int limit = orbit->iterations;
@@ -106,7 +105,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, __constant const stru
 }
 #endif
 
-INLINE void formula_all_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void formula_all_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
     if (!HAS_SHAPE) {
         orbits_inside(points, inside, orbit, k);
         return;
@@ -116,15 +115,11 @@ INLINE void formula_all_inside(const vec *points, mask *inside, __constant const
 }
 
 // As `solids_inside`: a formula is asked only where its ball is near.
-INLINE void one_inside(const vec *points, mask *inside, __constant const struct Orbit *o, __constant const scalar *k) {
+INLINE void one_inside(const vec *points, mask *inside, orbit_record o, constants k) {
     vec own[PACKETS];
     for (int p = 0; p < TURNS(PACKETS); ++p) own[p] = solid_own(o, points[p]);
     if (o->kind != SOLID_FORMULA) {
-        for (int p = 0; p < TURNS(PACKETS); ++p) {
-            solid_found found;
-            solid_simple(o, own[p], &found);
-            inside[p] = found.inside;
-        }
+        for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = simple_holds(o, own[p]);
         return;
     }
     const real radius = (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
@@ -140,7 +135,7 @@ INLINE void one_inside(const vec *points, mask *inside, __constant const struct 
     for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] &= near[p];
 }
 
-INLINE void solid_inside(const vec *points, mask *inside, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void solid_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
     if (!JOINED) {
         formula_all_inside(points, inside, orbit, k);
         return;

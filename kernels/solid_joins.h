@@ -5,11 +5,8 @@
 //
 // How deep a place is in a formula's set is not known. Where such a set is cut out it leaves a hollow, in which a distance lies between
 // two bounds, that are folded as distances are: it is at least that to what was cut, and may be any.
-INLINE surface_point surface_pick(mask m, surface_point yes, surface_point no) {
-    surface_point s;
-    for (int i = 0; i < NUMBERS_OF(surface_point); ++i) ((real *)&s)[i] = pick(m, ((const real *)&yes)[i], ((const real *)&no)[i]);
-    return s;
-}
+NUMBERS_PICKED(surface_point)
+#define surface_pick surface_point_pick
 
 // What is known of a surface as that of the other one.
 INLINE void surface_beside(surface_point *surface, surface_point other) {
@@ -39,10 +36,10 @@ INLINE real shared(real own, real other, mask own_told, mask other_told, real sh
 INLINE surface_point surface_flowing(surface_point all, surface_point more, mask closer, real of_more) {
     const real of_all = R(1.0) - of_more, first = of_all * (R(1.0) - all.share), second = of_all * all.share;
     const mask stays = ~closer & less(of_more, second);
-    surface_point found = surface_pick(closer, more, all), beside = all;
+    surface_point found = surface_point_pick(closer, more, all), beside = all;
     surface_beside(&beside, more);
     surface_beside(&found, all);
-    found = surface_pick(closer, found, surface_pick(stays, all, beside));
+    found = surface_point_pick(closer, found, surface_point_pick(stays, all, beside));
     found.share = pick(stays, all.share, pick(closer, first, of_more) / (first + of_more));
     return found;
 }
@@ -57,7 +54,7 @@ INLINE void solid_hollow(solid_found *all, solid_found more) {
     const real all_of_it = (real)(REAL_LARGEST), wall = pick(more.inside, all_of_it, -more.far);
     more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
     const mask counts = all->inside & less(all->far, wall);
-    all->surface = surface_pick(counts, more.surface, all->surface);
+    all->surface = surface_point_pick(counts, more.surface, all->surface);
     all->scale = pick(counts, more.scale, all->scale);
     all->far = fmax(all->far, pick(more.inside, R(0.0), -more.far));
     all->most = pick(more.inside, all_of_it, fmax(all->most, -more.far));
@@ -67,13 +64,13 @@ INLINE void solid_hollow(solid_found *all, solid_found more) {
 }
 
 // How near a solid has to be so that its surface is the nearest, not those before it.
-INLINE real nearest_before(__constant const struct Orbit *o, const solid_found *all) {
+INLINE real nearest_before(orbit_record o, const solid_found *all) {
     const scalar size = o->kind == SOLID_FORMULA ? o->ball_radius : fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
     return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
 }
 
 // Joins one more solid to those before it. `rounding`: what a place is not known better than.
-INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid_found more, real rounding) {
+INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real rounding) {
     if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
         solid_hollow(all, more);
         return;
@@ -97,7 +94,7 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
             surface_beside(&more.surface, surface_of_other(all->surface));
             more.surface.other_solid = more.surface.solid;
         }
-        all->surface = surface_pick(counts, more.surface, all->surface);
+        all->surface = surface_point_pick(counts, more.surface, all->surface);
         all->scale = pick(counts, more.scale, all->scale);
         all->far = fmax(all->far, more.far);
         all->most = fmax(all->most, more.far);
@@ -117,7 +114,7 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         const vec gradient = vec_along(vec_scale(all->surface.gradient, R(1.0) - of_more), of_more, more.surface.gradient);
         const real lower = fmin(a, b) - R(0.25) * width * share * share, scale = fmin(all->scale, more.scale);
         const surface_point flowing = surface_flowing(all->surface, more.surface, closer, of_more);
-        all->surface = surface_pick(flows, flowing, surface_pick(nearer, more.surface, all->surface));
+        all->surface = surface_point_pick(flows, flowing, surface_point_pick(nearer, more.surface, all->surface));
         all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
         all->far = pick(flows, lower * scale, fmin(all->far, more.far));
         all->most = pick(flows, all->far, fmin(all->most, more.far));
@@ -127,7 +124,7 @@ INLINE void solid_join(__constant const struct Orbit *o, solid_found *all, solid
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
         return;
     }
-    all->surface = surface_pick(nearer, more.surface, all->surface);
+    all->surface = surface_point_pick(nearer, more.surface, all->surface);
     all->scale = pick(nearer, more.scale, all->scale);
     all->far = fmin(all->far, more.far);
     all->most = fmin(all->most, more.far);

@@ -7,19 +7,19 @@
 
 // All data that stages without a formula read.
 typedef struct {
-    __constant const struct View *view;
-    __constant const struct March *settings;
-    __constant const struct Material *material;
-    __constant const struct Light *lights;
+    view_record view;
+    march_record settings;
+    material_record material;
+    light_record lights;
     __global const float *palette;
     __global const float *environment;
     plane_set planes;
     __constant const struct Pbr *materials;
     __global const float *albedos;
-    __global const struct Map *maps;
+    map_record maps;
     __global const float *tables;
     __global const scalar *set_lights;
-    __global const struct Object *objects;
+    object_record objects;
 } world;
 #define PLANE_SET {planes, orbit, k, plane_palettes, objects, settings->plane_count}
 #define WORLD {view, settings, material, lights, palette, environment, PLANE_SET, materials, albedos, maps, tables, set_lights, objects}
@@ -42,10 +42,14 @@ typedef struct {
 INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *state, __constant const int *at, int first_tile, int bounce,
                       int sample) {
     const int slot = (row * (span.end_packet - span.first_packet) + item) * LANES;
-    const stage s = {span, q, state + slot, at, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
-    return s;
+    return (stage){span, q, state + slot, at, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
 }
 #define STAGE_OF(name)                                                                                                     \
     const pass span_ = PASS;                                                                                               \
     const queue queue_ = STAGE_QUEUE;                                                                                      \
     const stage name = stage_of(ITEM, ROW, span_, queue_, state, settings->state_at, first_tile, bounce, sample)
+// The head of a stage: its packet, and all data; items that are none of the picture's packets end.
+#define STAGE_BEGINS(name, data)                                                                                           \
+    if (IS_BEYOND) return;                                                                                                 \
+    STAGE_OF(name);                                                                                                        \
+    const world data = WORLD

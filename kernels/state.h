@@ -16,6 +16,7 @@ typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(carried
 INLINE __global scalar *state_part(stage s, int part) { return s.state + s.at[part] * s.stride; }
 #define STATE_KEEP(s, thing, part) KEEP(thing, state_part(s, part), (s).stride)
 #define STATE_RECALL(s, thing, part) RECALL(thing, state_part(s, part), (s).stride)
+#define STATE_KEPT(s, type, thing, part) type thing; STATE_RECALL(s, thing, part)
 #define STATE_KEEP_ONE(s, thing, part, i) KEEP(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 #define STATE_RECALL_ONE(s, thing, part, i) RECALL(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 

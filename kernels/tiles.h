@@ -22,7 +22,7 @@ typedef struct {
 } packet_pixels;
 
 // The pixels of packet number `packet` of a tile whose top left pixel is `corner`.
-INLINE packet_pixels packet_at(int packet, int2 corner, __constant const struct View *view) {
+INLINE packet_pixels packet_at(int packet, int2 corner, view_record view) {
     packet_pixels p;
     // The bits of a packet's number and of a lane's are apart, so that their columns add up.
     const int first = packet * LANES;

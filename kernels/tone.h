@@ -27,9 +27,7 @@ float4 by_luminance(float4 light, __global const float *table) {
     return peak > 1.0f ? shown + (light - shown) * ((1.0f - shown) / (peak - shown)) : light;
 }
 
-float in_grey(float4 light) {
-    return TONE_INSET * (GREY_R * light.x + GREY_G * light.y + GREY_B * light.z);
-}
+float in_grey(float4 light) { return TONE_INSET * (GREY_R * light.x + GREY_G * light.y + GREY_B * light.z); }
 
 float outset(float value, float grey) {
     const float found = (value - grey) * TONE_BACK;

@@ -1,4 +1,10 @@
-// How near the orbit of a point comes to a trap.
+// How near the orbit of a point comes to a trap: a point, an axis or plane through it, or the sphere around it.
+typedef struct {
+    int shape;
+    vec center, direction;
+    real radius;
+} trap;
+
 // From the first three variables of z to the trap.
 INLINE real trap_distance(trap near, state z) {
     const vec offset = vec_sub(vec_of(z.s0, z.s1, z.s2), near.center);
@@ -10,7 +16,7 @@ INLINE real trap_distance(trap near, state z) {
 
 // How near z comes to a trap after one application or more, the one that leaves the bailout included. An orbit that is
 // outside from the start has only its start.
-INLINE real formula_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real formula_near(trap near, vec point, mask active, orbit_record orbit, constants k) {
     state c, z;
     start(point, k, &c, &z);
     const real at_start = trap_distance(near, z);
@@ -27,14 +33,14 @@ INLINE real formula_near(trap near, vec point, mask active, __constant const str
 }
 
 // How near the orbit of a point comes to a trap, under the formula that is nearest to the point; where two flow together, between theirs.
-INLINE real orbit_near(trap near, vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, constants k) {
     if (!JOINED) return formula_near(near, point, active, orbit, k);
     surface_point nearest;
     solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &nearest);
     real found = (real)(REAL_LARGEST), other = found;
     mask told = active & ~active, other_told = told;
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const real number = (real)((scalar)i);
         const mask here = active & equal(nearest.of, number);
         const mask beside = active & less(R(0.0), nearest.share) & equal(nearest.other_of, number);

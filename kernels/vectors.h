@@ -3,25 +3,33 @@ typedef struct {
     real x, y, z;
 } vec;
 
-INLINE vec vec_of(real x, real y, real z) {
-    const vec r = {x, y, z};
-    return r;
-}
+INLINE vec vec_of(real x, real y, real z) { return (vec){x, y, z}; }
 // Three numbers of a struct, the same for all lanes. A macro, as they may lie in any memory.
 #define vec_splat(a) vec_of((real)((a)[0]), (real)((a)[1]), (real)((a)[2]))
+#define vec_of_counts(a) vec_of((real)((scalar)(a)[0]), (real)((scalar)(a)[1]), (real)((scalar)(a)[2]))
+// A vector by the three axes of a record, and from its numbers along these.
+#define vec_along_axes(o, a) vec_of(vec_dot(a, vec_splat((o)->own_x)), vec_dot(a, vec_splat((o)->own_y)), vec_dot(a, vec_splat((o)->own_z)))
+#define vec_of_axes(o, a) \
+    vec_add(vec_add(vec_scale(vec_splat((o)->own_x), (a).x), vec_scale(vec_splat((o)->own_y), (a).y)), vec_scale(vec_splat((o)->own_z), (a).z))
 INLINE vec vec_add(vec a, vec b) { return vec_of(a.x + b.x, a.y + b.y, a.z + b.z); }
 INLINE vec vec_sub(vec a, vec b) { return vec_of(a.x - b.x, a.y - b.y, a.z - b.z); }
+INLINE vec vec_mul(vec a, vec b) { return vec_of(a.x * b.x, a.y * b.y, a.z * b.z); }
+INLINE vec vec_over(vec a, vec b) { return vec_of(a.x / b.x, a.y / b.y, a.z / b.z); }
 INLINE vec vec_scale(vec a, real s) { return vec_of(a.x * s, a.y * s, a.z * s); }
 // The point `distance` along a direction.
 INLINE vec vec_along(vec from, real distance, vec direction) {
     return vec_of(from.x + distance * direction.x, from.y + distance * direction.y, from.z + distance * direction.z);
 }
 INLINE real vec_dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
-INLINE vec vec_cross(vec a, vec b) {
-    return vec_of(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
-}
-INLINE vec vec_pick(mask m, vec yes, vec no) {
-    return vec_of(pick(m, yes.x, no.x), pick(m, yes.y, no.y), pick(m, yes.z, no.z));
+INLINE vec vec_cross(vec a, vec b) { return vec_of(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x); }
+INLINE vec vec_pick(mask m, vec yes, vec no) { return vec_of(pick(m, yes.x, no.x), pick(m, yes.y, no.y), pick(m, yes.z, no.z)); }
+
+// Of three numbers for each lane, and as these.
+#define vec_load(a) vec_of(lanes_load((a)[0]), lanes_load((a)[1]), lanes_load((a)[2]))
+INLINE void vec_store(vec v, scalar a[3][LANES]) {
+    lanes_store(v.x, a[0]);
+    lanes_store(v.y, a[1]);
+    lanes_store(v.z, a[2]);
 }
 
 // Length 1; a vector that is zero or not finite becomes zero. Scaled by the largest component first, so that squares neither

@@ -32,13 +32,13 @@ INLINE ray sample_ray(const packet_pixels *at, real across, real below, int samp
 // The kernel of an entry point: all have the same arguments.
 #define VOLUME(name)                                                                                                        \
     __kernel void name(PASS_BUFFERS, __constant const struct Volume *settings, __constant const struct Grid *about,         \
-                       __constant const struct Material *material, __constant const struct Light *lights,                   \
+                       material_record material, light_record lights,                   \
                        __global const float *transfer, __global const int *table, __global const int *blocks,               \
                        __global const uchar *values0, __global const uchar *values1, __global const uchar *values2,         \
                        __global const uchar *values3, __global const uchar *normals0, __global const uchar *normals1,       \
                        __global const uchar *normals2, __global const uchar *normals3,                                      \
-                       __constant const struct Orbit *orbits, __constant const scalar *k, __global const float *bounds,     \
-                       __global const float *environment, __global const struct CutPlane *planes,                           \
+                       orbit_record orbits, constants k, __global const float *bounds,     \
+                       __global const float *environment, plane_record planes,                           \
                        __global const float *plane_palettes, PASS_SPAN) {                                                   \
         const grid voxels = {about, table, blocks, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}}; \
         const plane_set set = {planes, orbits, k, plane_palettes, 0, settings->plane_count};                                \

@@ -13,10 +13,7 @@ typedef struct {
     int none;
 } quads;
 
-INLINE quads quads_ahead(ray r, mask wanted, world w) {
-    const quads q = {0};
-    return q;
-}
+INLINE quads quads_ahead(ray r, mask wanted, world w) { return (quads){0}; }
 
 // Adds those that are left before distance `until`, one after the other.
 INLINE void sight_quads(sight *s, real until, mask active, quads *q, world w) {}

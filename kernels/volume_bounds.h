@@ -36,5 +36,4 @@ INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value
 }
 
 INLINE real extinction_at(grid_ray r, real value, world w) { return opacity_of(value, w); }
-
 INLINE int shines_itself(world w) { return w.settings->shines; }

@@ -20,8 +20,9 @@ INLINE mask planes_leave(ray *r, world w) {
 // The plane at which a ray begins, or -1 where it begins outside the grid.
 INLINE real in_grid(ray r, real face, __constant const struct Grid *about) {
     const vec p = grid_own(about, vec_sub(vec_along(r.origin, r.near, r.direction), vec_splat(about->corner)));
-    const mask inside = less_equal(R(0.0), fmin(p.x, fmin(p.y, p.z))) & less_equal(p.x, (real)((scalar)about->sides[0])) &
-                        less_equal(p.y, (real)((scalar)about->sides[1])) & less_equal(p.z, (real)((scalar)about->sides[2]));
+    const vec sides = vec_of_counts(about->sides);
+    const mask inside = less_equal(R(0.0), fmin(p.x, fmin(p.y, p.z))) & less_equal(p.x, sides.x) & less_equal(p.y, sides.y) &
+                        less_equal(p.z, sides.z);
     return pick(inside, face, R(-1.0));
 }
 
@@ -41,8 +42,7 @@ typedef struct {
 } quads;
 
 INLINE quads quads_ahead(ray r, mask wanted, world w) {
-    const quads q = {r, wanted, planes_next(&r, R(-1.0), R(-1.0), wanted, w.planes)};
-    return q;
+    return (quads){r, wanted, planes_next(&r, R(-1.0), R(-1.0), wanted, w.planes)};
 }
 
 INLINE void sight_quads(sight *s, real until, mask active, quads *q, world w) {

@@ -3,11 +3,7 @@
 
 // The part of a light that gets through to a point.
 INLINE real light_through(vec point, vec normal, vec toward, real distance, mask active, world w, real *steps) {
-    ray r;
-    r.origin = vec_along(point, (real)(w.settings->shadow_lift), normal);
-    r.direction = toward;
-    r.near = R(0.0);
-    r.far = distance;
+    ray r = {.origin = vec_along(point, (real)(w.settings->shadow_lift), normal), .direction = toward, .far = distance};
     active &= planes_leave(&r, w);
     grid_ray g;
     active &= enter(r, w, &g);
@@ -32,7 +28,7 @@ INLINE real light_through(vec point, vec normal, vec toward, real distance, mask
 INLINE color lit(vec point, vec normal, color tint, vec to_viewer, mask active, world w, real *steps) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
-        __constant const struct Light *light = w.lights + i;
+        light_record light = w.lights + i;
         const incidence in = light_at(light, point);
         const mask all_lanes = equal(R(0.0), R(0.0));
         const color open = phong(tint, normal, to_viewer, in, all_lanes, R(1.0), light, w.material);

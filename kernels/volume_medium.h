@@ -70,11 +70,7 @@ INLINE mask sight_step(sight *e, unlit *u, grid_ray g, mask active, real *number
 INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, const plane_face *face, mask wanted, world w, real *looked) {
     const vec to_viewer = vec_scale(r.direction, R(-1.0));
     quads q = quads_ahead(r, wanted, w);
-    unlit u;
-    for (int k = 0; k < TURNS(PENDING); ++k) u.places[k].number = u.places[k].value = u.places[k].weight = R(0.0);
-    u.count = R(0.0);
-    u.half_number = R(-1.0);
-    u.sum = color_of(R(0.0), R(0.0), R(0.0));
+    unlit u = {.half_number = R(-1.0)};
     real number = R(0.0);
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (any_lane(active)) active = sight_step(e, &u, g, active, &number, &q, w, looked);

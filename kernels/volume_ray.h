@@ -1,14 +1,14 @@
 // Rays through a grid: the data that they read, where they enter and leave, and the transfer function.
 typedef struct {
-    __constant const struct View *view;
+    view_record view;
     __constant const struct Volume *settings;
-    __constant const struct Material *material;
-    __constant const struct Light *lights;
+    material_record material;
+    light_record lights;
     __global const float *transfer;   // columns of TRANSFER_SIZE numbers: opacity of a step, colour, light that a step adds
     grid grid;
     __constant const struct Sampling *sampling;
-    __constant const struct Orbit *orbits;   // the solid, and the formulas' constants; nothing where no program asks them
-    __constant const scalar *k;
+    orbit_record orbits;   // the solid, and the formulas' constants; nothing where no program asks them
+    constants k;
     __global const float *bounds;        // along paths: of each stored brick the most extinction that may be met in it ...
     __global const float *environment;   // ... and see environment.h
     plane_set planes;
@@ -25,9 +25,7 @@ typedef struct {
 } grid_ray;
 
 // A direction in voxels along the grid's own axes.
-INLINE vec grid_own(__constant const struct Grid *about, vec a) {
-    return vec_of(vec_dot(a, vec_splat(about->own_x)), vec_dot(a, vec_splat(about->own_y)), vec_dot(a, vec_splat(about->own_z)));
-}
+INLINE vec grid_own(__constant const struct Grid *about, vec a) { return vec_along_axes(about, a); }
 
 INLINE real safe_inverse(real a) { return R(1.0) / pick(less(fabs(a), R(1e-20)), R(1e-20), a); }
 
@@ -37,17 +35,14 @@ INLINE mask enter(ray r, world w, grid_ray *g) {
     const vec origin = grid_own(about, vec_sub(r.origin, vec_splat(about->corner)));
     const vec direction = grid_own(about, r.direction);
     const vec inverse = vec_of(safe_inverse(direction.x), safe_inverse(direction.y), safe_inverse(direction.z));
-    const vec first = vec_of(-origin.x * inverse.x, -origin.y * inverse.y, -origin.z * inverse.z);
-    const vec last = vec_of(((real)((scalar)about->sides[0]) - origin.x) * inverse.x,
-                            ((real)((scalar)about->sides[1]) - origin.y) * inverse.y,
-                            ((real)((scalar)about->sides[2]) - origin.z) * inverse.z);
+    const vec first = vec_mul(vec_scale(origin, R(-1.0)), inverse), last = vec_mul(vec_sub(vec_of_counts(about->sides), origin), inverse);
     g->near = fmax(fmax(fmin(first.x, last.x), fmin(first.y, last.y)), fmax(fmin(first.z, last.z), r.near));
     g->far = fmin(fmin(fmax(first.x, last.x), fmax(first.y, last.y)), fmin(fmax(first.z, last.z), r.far));
     const real step = (real)(w.settings->step), steps = R(1.0) / step;
     g->first = vec_sub(vec_along(origin, g->near, direction), vec_of(R(0.5), R(0.5), R(0.5)));
     g->step = vec_scale(direction, step);
     g->per_step = vec_scale(inverse, steps);
-    g->passed = vec_of(-g->first.x * g->per_step.x, -g->first.y * g->per_step.y, -g->first.z * g->per_step.z);
+    g->passed = vec_mul(vec_scale(g->first, R(-1.0)), g->per_step);
     g->back[0] = less_equal(direction.x, R(0.0));
     g->back[1] = less_equal(direction.y, R(0.0));
     g->back[2] = less_equal(direction.z, R(0.0));
@@ -100,10 +95,8 @@ typedef struct {
 INLINE transfer_place transfer_at(real value, __constant const struct Volume *settings) {
     const real place = clamp((value - (real)(settings->low)) * (real)(settings->range), R(0.0), R(1.0));
     const real at = place * (real)((scalar)(TRANSFER_SIZE - 1));
-    transfer_place p;
-    p.first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
-    p.share = at - to_reals(p.first);
-    return p;
+    const ints first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
+    return (transfer_place){first, at - to_reals(first)};
 }
 
 INLINE real transfer_column(transfer_place p, int column, __global const float *transfer) {

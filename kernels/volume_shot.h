@@ -24,15 +24,11 @@ INLINE shot take_shot(ray r, real y, real time, mask wanted, world w, sight *e, 
     *e = nothing;
     sight_grid(e, r, g, active, bare, &face, wanted, w, &looked);
     const color background = background_of(y, w);
-    shot s;
-    s.coverage = R(1.0) - e->through;
-    s.hit = e->found;
-    s.radiance = color_add(e->light, color_scale(background, e->through));
-    s.point = vec_along(r.origin, e->t, r.direction);
+    const real told = e->value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
+    shot s = {.radiance = color_add(e->light, color_scale(background, e->through)), .hit = e->found, .coverage = R(1.0) - e->through,
+              .normal = e->normal, .point = vec_along(r.origin, e->t, r.direction), .smooth = pick(e->on_plane, e->value, told),
+              .steps = looked};
     s.depth = depth_of(s.point, time, w.view);
-    s.normal = e->normal;
-    s.smooth = pick(e->on_plane, e->value, e->value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset));
-    s.steps = looked;
     *steps += looked;
     return s;
 }

@@ -14,11 +14,7 @@ typedef struct {
 
 INLINE stream stream_of(const packet_pixels *at, uint seed, uint purpose, int sample) {
     const bits own = hash_bits(pixel_seed(at->columns, at->rows, seed, purpose) + (bits)((uint)sample) * 0x9e3779b9u);
-    stream s;
-    s.seed = own;
-    s.stride = hash_bits(own ^ 0x68bc21ebu) | 1u;
-    s.count = to_ints(R(0.0));
-    return s;
+    return (stream){own, hash_bits(own ^ 0x68bc21ebu) | 1u, to_ints(R(0.0))};
 }
 
 // The next number of the active lanes, strictly within (0, 1).

@@ -1,20 +1,16 @@
 // Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (stored bricks have a ninth layer).
-// A brick's or node's place is packed into 64 bits: x, y and z in 21 bits each, x lowest.
+#include "orbits.h"
+#include "bricks.h"
 
-#include "fill_packets.h"
+// Packets whose orbits are computed side by side, so that one goes on while another waits for a result. Where there is one
+// lane, the device has other work-items for that.
+#define PACKETS (LANES == 1 ? 1 : 2)
 #include "solid_inside.h"
 
-#define BRICK 8
-#define BRICK_VOXELS 512
 // Voxels are in the order of a brick's octants, 4 x 4 x 4 (x fastest, in and between them): packets that are compact end
 // together, and octants can be left out.
-#define OCTANT_VOXELS 64
 // Voxels of a work-item, 8 at least: of the bits that are stored for them no two work-items share a byte.
 #define ITEM_VOXELS (LANES * PACKETS < 8 ? 8 : LANES * PACKETS)
-
-#define PLACE_X(place) ((int)((place) & 0x1fffff))
-#define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
-#define PLACE_Z(place) ((int)((place) >> 42))
 
 // The points of voxels `first` and those after it in a brick: coordinates are looked up, because they are found in float64
 // and rounded once. `axes` has x, then y, then z; each has its sub-points' coordinates one after the other.
@@ -43,9 +39,12 @@ INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const s
 #define FILL(name)                                                                                                               \
     __kernel void name(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known, int floats, \
                        float scale, __global const scalar *axes, __constant const struct Lattice *lattice,                        \
-                       __constant const struct Orbit *orbit, __constant const scalar *k)
-#define FILLED_BRICK ((size_t)first + get_global_id(1))
-#define FILLED_VOXEL ((int)get_global_id(0) * ITEM_VOXELS)
+                       orbit_record orbit, constants k)
+// The head of each: the brick and the voxel of a work-item.
+#define FILL_BEGINS(brick, item)                                \
+    if (orbit_cancelled(orbit)) return;                         \
+    const size_t brick = (size_t)first + get_global_id(1);      \
+    const int item = (int)get_global_id(0) * ITEM_VOXELS
 
 // Whether a voxel's octant is known to hold nothing (which = 0), or nothing else (1).
 INLINE bool octant_is_known(__global const uchar *known, size_t brick, int voxel, int which) {
@@ -59,10 +58,7 @@ INLINE void keep_values(__global uchar *samples, size_t brick, int first, real v
     const size_t at = brick * BRICK_VOXELS + first;
     for (int lane = 0; lane < LANES; ++lane) {
         const float value = (float)each[lane];
-        if (floats) {
-            ((__global float *)samples)[at + lane] = value;
-        } else {
-            samples[at + lane] = convert_uchar_sat_rte(value * scale);
-        }
+        if (floats) ((__global float *)samples)[at + lane] = value;
+        else samples[at + lane] = convert_uchar_sat_rte(value * scale);
     }
 }

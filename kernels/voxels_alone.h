@@ -14,29 +14,24 @@ typedef uint16 wide_uint;
 #define WHOLE(a) as_uint16(convert_int16(a))
 #endif
 
-#if ALONE
 // The place of a brick, and where its voxels are.
 typedef struct {
     int x, y, z;
+#if ALONE
     __global const int *numbers;
+#else
+    int near[27];  // the evaluated bricks around it, x fastest; or ALL_OUTSIDE, ALL_INSIDE
+#endif
 } near_bricks;
 
-INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
-    const near_bricks around = {PLACE_X(place), PLACE_Y(place), PLACE_Z(place), numbers};
-    return around;
-}
-
-// The voxels around a work-item's `own` x of the brick.
+#if ALONE || SOURCE != SOURCE_BITS
+// The voxels around a brick, or around the `own` x of it of a work-item that is alone: rows are loaded one by one.
 typedef struct {
     __global const SAMPLE *samples;
     const near_bricks *around;
     __constant const struct Extent *extent;
     int own;
 } neighbourhood;
-typedef struct {
-    const neighbourhood *n;
-    int y, z;
-} row;
 
 INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const near_bricks *around,
                                __constant const struct Extent *extent) {
@@ -44,11 +39,19 @@ INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples,
     n->around = around;
     n->extent = extent;
 }
+#endif
 
-INLINE row row_at(const neighbourhood *n, int y, int z) {
-    const row r = {n, y, z};
-    return r;
+#if ALONE
+INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
+    return (near_bricks){PLACE_X(place), PLACE_Y(place), PLACE_Z(place), numbers};
 }
+
+typedef struct {
+    const neighbourhood *n;
+    int y, z;
+} row;
+
+INLINE row row_at(const neighbourhood *n, int y, int z) { return (row){n, y, z}; }
 
 // The voxel `offset` from the own one.
 INLINE float row_window(const row *r, int offset) {

@@ -1,8 +1,6 @@
 // Which parts of stored bricks may be seen: a bit for each block of 2 x 2 x 2 cells; and the values in each. One work-item takes one brick.
 #include "direct.h"
-
-#define BRICK_SIDE 9
-#define BRICK_STRIDE 736
+#include "bricks.h"
 
 // A stored value, as it is kept.
 float value_at(__global const uchar *values, size_t at, int floats) {

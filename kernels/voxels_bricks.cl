@@ -4,24 +4,10 @@
 #include "structs.h"
 #include "voxels_bricks.h"
 
-// Weights of the binomial low-pass filter of RADIUS, and of the central difference after it, for voxels 1, 2, ... away (the
+// Weights of the binomial low-pass filter of each RADIUS, and of the central difference after it, for voxels 1, 2, ... away (the
 // other side has the same, and the same negated): as differences of equal values they give exactly 0.
-#if RADIUS == 0
-#define SMOOTH {1.0f}
-#define DIFFER {1.0f}
-#elif RADIUS == 1
-#define SMOOTH {2.0f, 1.0f}
-#define DIFFER {2.0f, 1.0f}
-#elif RADIUS == 2
-#define SMOOTH {6.0f, 4.0f, 1.0f}
-#define DIFFER {5.0f, 4.0f, 1.0f}
-#elif RADIUS == 3
-#define SMOOTH {20.0f, 15.0f, 6.0f, 1.0f}
-#define DIFFER {14.0f, 14.0f, 6.0f, 1.0f}
-#else
-#define SMOOTH {70.0f, 56.0f, 28.0f, 8.0f, 1.0f}
-#define DIFFER {42.0f, 48.0f, 27.0f, 8.0f, 1.0f}
-#endif
+__constant float SMOOTH[5][5] = {{1.0f}, {2.0f, 1.0f}, {6.0f, 4.0f, 1.0f}, {20.0f, 15.0f, 6.0f, 1.0f}, {70.0f, 56.0f, 28.0f, 8.0f, 1.0f}};
+__constant float DIFFER[5][5] = {{1.0f}, {2.0f, 1.0f}, {5.0f, 4.0f, 1.0f}, {14.0f, 14.0f, 6.0f, 1.0f}, {42.0f, 48.0f, 27.0f, 8.0f, 1.0f}};
 #define REACH (RADIUS + 1)  // voxels that a normal depends on, to each side
 #define LAYERS (BRICK_SIDE + 2 * REACH)
 // Where a layer or a line is kept while others need it. One that is alone keeps them in registers, which have no places that are
@@ -41,17 +27,15 @@
 
 // The filter's mean of numbers `step` apart around the one in the middle, and its difference of those after and before.
 INLINE wide smoothed(const wide *middle, int step) {
-    const float weights[] = SMOOTH;
-    wide sum = weights[0] * middle[0];
+    wide sum = SMOOTH[RADIUS][0] * middle[0];
     #pragma unroll
-    for (int i = 1; i <= RADIUS; ++i) sum += weights[i] * (middle[-i * step] + middle[i * step]);
+    for (int i = 1; i <= RADIUS; ++i) sum += SMOOTH[RADIUS][i] * (middle[-i * step] + middle[i * step]);
     return sum;
 }
 INLINE wide differed(const wide *middle, int step) {
-    const float weights[] = DIFFER;
     wide sum = (wide)(0.0f);
     #pragma unroll
-    for (int i = 1; i <= REACH; ++i) sum += weights[i - 1] * (middle[i * step] - middle[-i * step]);
+    for (int i = 1; i <= REACH; ++i) sum += DIFFER[RADIUS][i - 1] * (middle[i * step] - middle[-i * step]);
     return sum;
 }
 

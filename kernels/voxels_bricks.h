@@ -5,49 +5,16 @@
 // whether a work-item has one voxel's place of each row (for GPUs) instead of a vector of them (for processors).
 // Voxels past the ends of the grid repeat the last one.
 #include "direct.h"
-
-#define BRICK 8
-#define BRICK_SIDE 9
-#define BRICK_SAMPLES 729
-#define BRICK_STRIDE 736
-#define OCTANT_VOXELS 64
-
-#define PLACE_X(place) ((int)((place) & 0x1fffff))
-#define PLACE_Y(place) ((int)(((place) >> 21) & 0x1fffff))
-#define PLACE_Z(place) ((int)((place) >> 42))
-
-// Drivers that interpret cannot inline: see lanes.h.
-#ifdef INTERPRETED
-#define INLINE static inline
-#else
-#define INLINE static inline __attribute__((always_inline))
-#endif
+#include "bricks.h"
 
 #include "voxels_alone.h"
 
 #if !ALONE
-// Where a brick's voxels are.
-typedef struct {
-    int x, y, z;   // the brick's place
-    int near[27];  // the evaluated bricks around it, x fastest; or ALL_OUTSIDE, ALL_INSIDE
-} near_bricks;
-
-#if SOURCE == SOURCE_SLAB
 INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
-    near_bricks around;
-    around.x = PLACE_X(place);
-    around.y = PLACE_Y(place);
-    around.z = PLACE_Z(place);
-    return around;
-}
-#else
-INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __constant const struct Extent *extent) {
-    near_bricks around;
-    around.x = PLACE_X(place);
-    around.y = PLACE_Y(place);
-    around.z = PLACE_Z(place);
+    near_bricks around = {PLACE_X(place), PLACE_Y(place), PLACE_Z(place)};
     int next = 0;
-    for (int z = around.z - 1; z <= around.z + 1; ++z) {
+    // Of a slab they are rows of one whole.
+    for (int z = around.z - 1; z <= around.z + 1 && SOURCE != SOURCE_SLAB; ++z) {
         for (int y = around.y - 1; y <= around.y + 1; ++y) {
             for (int x = around.x - 1; x <= around.x + 1; ++x) {
                 const bool there = x >= 0 && x < extent->bricks[0] && y >= 0 && y < extent->bricks[1] && z >= 0 &&
@@ -60,15 +27,9 @@ INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __co
     return around;
 }
 
-#endif
-
 #if SOURCE == SOURCE_BITS
 // The voxels around a brick: whole octants, so far that normals find theirs.
-#if RADIUS <= 2
-#define OCTANTS_BEFORE 1
-#else
-#define OCTANTS_BEFORE 2
-#endif
+#define OCTANTS_BEFORE (RADIUS <= 2 ? 1 : 2)
 #define OCTANTS (2 + 2 * OCTANTS_BEFORE)
 #define VOXELS_BEFORE (4 * OCTANTS_BEFORE)
 #define SPAN (4 * OCTANTS)
@@ -137,20 +98,6 @@ INLINE float16 row_window(const row *r, int offset) {
     return convert_float16(convert_int16(((uint16)(*r) >> shift) & 1u));
 }
 #else
-// Rows are loaded one by one.
-typedef struct {
-    __global const SAMPLE *samples;
-    const near_bricks *around;
-    __constant const struct Extent *extent;
-} neighbourhood;
-
-INLINE void load_neighbourhood(neighbourhood *n, __global const SAMPLE *samples, const near_bricks *around,
-                               __constant const struct Extent *extent) {
-    n->samples = samples;
-    n->around = around;
-    n->extent = extent;
-}
-
 // Voxel x of the row is entry x + VOXELS_BEFORE.
 #if RADIUS <= 2
 #define VOXELS_BEFORE 4

@@ -1,16 +1,9 @@
 // How much of each voxel of bricks is inside. One work-item takes ITEM_VOXELS of a brick.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
 #include "voxels.h"
 
 // The shares of PACKETS packets from voxel `first` on that are inside, 0 to 1: of their sub-points.
 INLINE void packet_shares(ulong place, int first, real *shares, __global const scalar *axes, __constant const struct Lattice *lattice,
-                          __constant const struct Orbit *orbit, __constant const scalar *k) {
+                          orbit_record orbit, constants k) {
     const int n = lattice->sub_points;
     for (int p = 0; p < TURNS(PACKETS); ++p) shares[p] = R(0.0);
     int4 sub_point = (int4)(0);
@@ -30,9 +23,7 @@ INLINE void packet_shares(ulong place, int first, real *shares, __global const s
 }
 
 FILL(cover_bricks) {
-    if (orbit_cancelled(orbit)) return;
-    const size_t brick = FILLED_BRICK;
-    const int item = FILLED_VOXEL;
+    FILL_BEGINS(brick, item);
     const ulong place = bricks[brick];
     const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
     for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {

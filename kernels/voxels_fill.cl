@@ -1,17 +1,8 @@
 // Which voxels of bricks are inside. One work-item takes ITEM_VOXELS of a brick.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
 #include "voxels.h"
 
 FILL(fill_bricks) {
-    if (orbit_cancelled(orbit)) return;
-    const size_t brick = FILLED_BRICK;
-    const int item = FILLED_VOXEL;
+    FILL_BEGINS(brick, item);
     const ulong place = bricks[brick];
     const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
     uint bits = full ? 0xffffffffu : 0u;

@@ -1,19 +1,10 @@
 // Normals of the samples that a ray meets the surface between, from the formula itself. One work-item takes a brick.
 //
 // From the build: NORMALS_LEAST_SQUARES, NORMALS_EXACT and which of them NORMALS is.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
+#include "orbits.h"
 #include "normals.h"
 #include "voxels.h"
 
-#define BRICK_SIDE 9
-#define BRICK_SAMPLES 729
-#define BRICK_STRIDE 736
 // How far from a sample the surface is looked for, to each side, and the tests that narrow it down: in sides of a voxel. A
 // cell's diagonal is 1.7 of them.
 #define SEARCH S(2.0)
@@ -73,8 +64,7 @@ typedef struct {
 
 // The places along lines, in scene units from their middles, where they go from inside to outside: the outer end of a
 // bracket that is narrowed down. Not found: none, or not within reach.
-INLINE void find_surface(const lines *l, real side, real *place, mask *found, __constant const struct Orbit *orbit,
-                         __constant const scalar *k) {
+INLINE void find_surface(const lines *l, real side, real *place, mask *found, orbit_record orbit, constants k) {
     real inner[PACKETS], outer[PACKETS];
     mask before[PACKETS], here[PACKETS];
     vec points[PACKETS];
@@ -115,8 +105,7 @@ INLINE void find_surface(const lines *l, real side, real *place, mask *found, __
 
 #if NORMALS == NORMALS_EXACT
 // From the Jacobian just outside the surface.
-INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, __constant const struct Orbit *orbit,
-                            __constant const scalar *k) {
+INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, orbit_record orbit, constants k) {
     real place[PACKETS];
     find_surface(l, side, place, usable, orbit, k);
     for (int p = 0; p < TURNS(PACKETS); ++p) {
@@ -129,8 +118,7 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
 #else
 // Eq. 7-10: the plane through points of the surface on lines along -G, in a frame with that as its third axis, so that steep
 // faces work.
-INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, __constant const struct Orbit *orbit,
-                            __constant const scalar *k) {
+INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, orbit_record orbit, constants k) {
     vec across[PACKETS], up[PACKETS];
     plane_sums sums[PACKETS];
     lines line = *l;
@@ -164,12 +152,10 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
 // where it finds nothing.
 __kernel void refine_normals(__global uint *normals, __global const ulong *bricks, int first, int count, int slot,
                              __global const scalar *axes, __constant const struct Lattice *lattice,
-                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+                             orbit_record orbit, constants k) {
     const int brick = first + (int)get_global_id(1);
     if (brick >= count) return;
     __global uint *normal = normals + (size_t)(slot + brick) * BRICK_STRIDE;
-    __global const scalar *along_y = axes + lattice->sub_points * lattice->padded[0];
-    __global const scalar *along_z = along_y + lattice->sub_points * lattice->padded[1];
     const ulong place = bricks[brick];
     const real side = (real)(lattice->side);
     for (int next = 0;;) {
@@ -181,38 +167,34 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
         if (wanted == 0) break;
         lines l;
         for (int p = 0; p < TURNS(PACKETS); ++p) {
-            scalar x[LANES], y[LANES], z[LANES], nx[LANES], ny[LANES], nz[LANES];
+            scalar from[3][LANES], out[3][LANES];
             for (int lane = 0; lane < LANES; ++lane) {
                 // The last lanes repeat the last sample.
                 const int sample = list[min(p * LANES + lane, wanted - 1)];
-                const uint color = normal[sample];
-                const int voxel_x = BRICK * PLACE_X(place) + sample % BRICK_SIDE;
-                const int voxel_y = BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE;
-                const int voxel_z = BRICK * PLACE_Z(place) + sample / (BRICK_SIDE * BRICK_SIDE);
-                x[lane] = lattice->middle_offset[0] + axes[min(voxel_x, lattice->last[0])];
-                y[lane] = lattice->middle_offset[1] + along_y[min(voxel_y, lattice->last[1])];
-                z[lane] = lattice->middle_offset[2] + along_z[min(voxel_z, lattice->last[2])];
-                nx[lane] = (scalar)(color & 255) - S(127.5);
-                ny[lane] = (scalar)((color >> 8) & 255) - S(127.5);
-                nz[lane] = (scalar)((color >> 16) & 255) - S(127.5);
+                const int voxel[3] = {BRICK * PLACE_X(place) + sample % BRICK_SIDE, BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE,
+                                      BRICK * PLACE_Z(place) + sample / (BRICK_SIDE * BRICK_SIDE)};
+                __global const scalar *along = axes;
+                for (int axis = 0; axis < 3; ++axis) {
+                    from[axis][lane] = lattice->middle_offset[axis] + along[min(voxel[axis], lattice->last[axis])];
+                    out[axis][lane] = (scalar)((normal[sample] >> (8 * axis)) & 255) - S(127.5);
+                    along += lattice->sub_points * lattice->padded[axis];
+                }
             }
-            l.from[p] = vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
-            l.out[p] = vec_normalize(vec_of(lanes_load(nx), lanes_load(ny), lanes_load(nz)));
+            l.from[p] = vec_load(from);
+            l.out[p] = vec_normalize(vec_load(out));
         }
         vec found[PACKETS];
         mask usable[PACKETS];
         surface_normals(&l, side, found, usable, orbit, k);
         for (int p = 0; p < TURNS(PACKETS); ++p) {
-            scalar nx[LANES], ny[LANES], nz[LANES], good[LANES];
-            lanes_store(found[p].x, nx);
-            lanes_store(found[p].y, ny);
-            lanes_store(found[p].z, nz);
+            scalar n[3][LANES], good[LANES];
+            vec_store(found[p], n);
             lanes_store(pick(usable[p], R(1.0), R(0.0)), good);
             for (int lane = 0; lane < LANES; ++lane) {
                 const int at = p * LANES + lane;
                 if (at >= wanted || good[lane] == 0) continue;
                 const int sample = list[at];
-                normal[sample] = packed((float)nx[lane], (float)ny[lane], (float)nz[lane]) | (normal[sample] & 0xff000000u);
+                normal[sample] = packed((float)n[0][lane], (float)n[1][lane], (float)n[2][lane]) | (normal[sample] & 0xff000000u);
             }
         }
     }

@@ -94,8 +94,8 @@ INLINE void walk_enters(march *m, walk *a, mask here, world w) {
 }
 
 // One test of the active lanes; those that leave the set, meet what stands in it or end are active no longer.
-INLINE void walk_step(march *m, walk *a, int bounce, world w, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    __constant const struct March *settings = w.settings;
+INLINE void walk_step(march *m, walk *a, int bounce, world w, orbit_record orbit, constants k) {
+    march_record settings = w.settings;
     const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
     const vec point = vec_along(m->r.origin, m->t, m->r.direction);
     const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
@@ -193,8 +193,8 @@ INLINE void walk_puts(const march *m, const walk *a, const int *places, uint end
 }
 
 // Walks the paths of a share of the queue; the result is how many lanes have waited, in steps.
-INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, int bounce, world w, __constant const struct Orbit *orbit,
-                      __constant const scalar *k) {
+INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, int bounce, world w, orbit_record orbit,
+                      constants k) {
     share left = mine;
     march m = {0};
     walk a = {0};

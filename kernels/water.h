@@ -18,12 +18,12 @@ INLINE void wave_turn(real phase, real *sine, real *cosine) {
 #endif
 }
 
-INLINE real wave_phase(__global const struct Object *o, int i, real u, real v) {
+INLINE real wave_phase(object_record o, int i, real u, real v) {
     return (real)(o->wave_x[i]) * u + (real)(o->wave_y[i]) * v + (real)(o->wave_phase[i]);
 }
 
 // The height over a place of the plane, scene units, and how it changes on a way along the plane.
-INLINE real water_height(__global const struct Object *o, real u, real v, vec way, real *change) {
+INLINE real water_height(object_record o, real u, real v, vec way, real *change) {
     real sum = R(0.0), slope = R(0.0);
     for (int i = 0; i < WAVES; ++i) {
         real sine, cosine;
@@ -38,7 +38,7 @@ INLINE real water_height(__global const struct Object *o, real u, real v, vec wa
 }
 
 // The normal over a place of the plane in its own frame; not of length 1.
-INLINE vec water_normal(__global const struct Object *o, real u, real v) {
+INLINE vec water_normal(object_record o, real u, real v) {
     vec normal = vec_of(R(0.0), R(0.0), R(1.0));
     for (int i = 0; i < WAVES; ++i) {
         real sine, cosine;
@@ -51,7 +51,7 @@ INLINE vec water_normal(__global const struct Object *o, real u, real v) {
 }
 
 // How much the height over a way can change, at most, and how much that change can.
-INLINE void water_limits(__global const struct Object *o, vec way, real *slope, real *bend) {
+INLINE void water_limits(object_record o, vec way, real *slope, real *bend) {
     real first = R(0.0), second = R(0.0);
     for (int i = 0; i < WAVES; ++i) {
         const real turn = fabs((real)(o->wave_x[i]) * way.x + (real)(o->wave_y[i]) * way.y), rise = (real)(o->wave_height[i]) * turn;
@@ -72,7 +72,7 @@ INLINE real water_step(real height, real change, real fall, real bend) {
 }
 
 // How far along a ray water is met before `far`, or the largest number; `from` and `way` in the plane's frame.
-INLINE real water_met(__global const struct Object *o, vec from, vec way, real far, real footprint, real spread) {
+INLINE real water_met(object_record o, vec from, vec way, real far, real footprint, real spread) {
     const real reach = (real)(o->wave_reach), level = divisor(way.z);
     const mask flat = less(fabs(way.z), R(1e-9)), within = less_equal(fabs(from.z), reach);
     const real a = (reach - from.z) / level, b = (-reach - from.z) / level;

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from clfractal.device.orbit import SHAPE_KINDS
 from clfractal.resources import folder
 
 MOST_LINES = 80
@@ -39,3 +40,18 @@ def test_no_function_of_a_kernel_is_long() -> None:
 def test_functions_are_counted() -> None:
     text = "INLINE int one(int a) { return a; }\n\n__kernel void two(\n    int a) {\n    a = 1;\n}\n"
     assert list(functions(text)) == [("one", 1), ("two", 4)]
+
+
+def test_each_shape_is_a_file_with_all_functions() -> None:
+    """The table of `shapes.h` has the kinds that records number, and for each a file with what is asked of shapes."""
+    kernels = folder("kernels")
+    text = (kernels / "shapes.h").read_text("utf-8")
+    table = re.search(r"^#define SHAPES\(DO\) (.*)$", text, re.MULTILINE)
+    assert table is not None
+    names = dict(re.findall(r"DO\((\w+), (\w+)\)", table[1]))
+    assert {kind.lower() for kind in names} == set(SHAPE_KINDS)
+    asked = re.findall(r"^//   \w+ NAME_(\w+)\(", text, re.MULTILINE)
+    assert len(asked) == 5
+    for name in names.values():
+        found = dict(functions((kernels / f"shape_{name}.h").read_text("utf-8")))
+        assert {f"{name}_{function}" for function in asked} <= set(found)

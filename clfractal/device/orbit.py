@@ -14,7 +14,9 @@ from clfractal.formulas.language import Chain
 
 Record = np.ndarray[Any, np.dtype[np.void]]
 
-SOLID_KINDS = {"formula": 0, "plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
+SHAPE_KINDS = {"plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
+"""Shapes, of solids and of objects: as in the table of `kernels/shapes.h`."""
+SOLID_KINDS = {"formula": 0, **SHAPE_KINDS}
 JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
 ORBIT = Struct(
@@ -59,7 +61,8 @@ ORBIT = Struct(
         Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
     ],
     kinds=[
-        *((f"SOLID_{kind.upper()}", number) for kind, number in SOLID_KINDS.items()),
+        ("SOLID_FORMULA", SOLID_KINDS["formula"]),
+        *((f"SHAPE_{kind.upper()}", number) for kind, number in SHAPE_KINDS.items()),
         *((f"JOIN_{join.split('_')[0].upper()}", number) for join, number in JOINS.items()),
     ],
 )

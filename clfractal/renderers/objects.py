@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.orbit import Record
+from clfractal.device.orbit import SHAPE_KINDS, Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers.emitters import asked_radiance
 from clfractal.renderers.maps import MappedMaterials, glass_bodies
@@ -22,16 +22,8 @@ from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import AXES, AnyObject, FormulaObject, Solid, VolumeObject, WaterObject
 
-OBJECT_KINDS = {
-    "plane": 0,
-    "water": 1,
-    "sphere": 2,
-    "box": 3,
-    "cylinder": 4,
-    "joined": 5,
-    "volume": 6,
-    "cloud": 7,
-}
+_OTHER_KINDS = {"water": 0, "joined": 5, "volume": 6, "cloud": 7}
+OBJECT_KINDS = SHAPE_KINDS | _OTHER_KINDS
 # In footprints at `detail` 1: surfaces in grids are where a search has found them, and no equation tells how far off
 # that is.
 GRID_LIFT = 0.05
@@ -95,7 +87,7 @@ def object_defines(scene: Scene) -> dict[str, object]:
     return {
         "WAVES": WAVES,
         **grid_defines(),
-        **{f"OBJECT_{kind.upper()}": number for kind, number in OBJECT_KINDS.items()},
+        **{f"OBJECT_{kind.upper()}": number for kind, number in _OTHER_KINDS.items()},
     }
 
 

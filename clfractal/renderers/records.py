@@ -313,7 +313,7 @@ def material_record(
 
 
 def _glow(scene: Scene) -> dict[str, object]:
-    """The fields of a Material for `kernels/glow.h`."""
+    """The fields of a Material for `kernels/glow.cl`."""
     glow = scene.glow or Glow()
     return {
         "glow_color": tuple(glow.intensity * part for part in glow.color),

@@ -45,7 +45,7 @@ ALONE_ITEMS, ALONE_GROUP = 96, (32, 1)
 NODE_POINTS = 64
 # Applications between two looks at a packet.
 CHUNK = 4
-# Packets of a work-item side by side, where packets have lanes: as in `kernels/fill_packets.h`.
+# Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
 PACKETS = 2
 
 _BUFFER = Argument("buffer", 8192)

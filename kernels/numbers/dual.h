@@ -7,75 +7,35 @@ typedef struct {
 } dual;
 
 // The dual number with value `v` whose partials are those of `a`, scaled: the chain rule for a function of one number.
-INLINE dual dual_chain(real v, real slope, dual a) {
-    const dual r = {v, slope * a.dx, slope * a.dy, slope * a.dz};
-    return r;
-}
+INLINE dual dual_chain(real v, real slope, dual a) { return (dual){v, slope * a.dx, slope * a.dy, slope * a.dz}; }
 
 // The chain rule for a function of two numbers with partials `fa` and `fb`.
 INLINE dual dual_chain2(real v, real fa, dual a, real fb, dual b) {
-    const dual r = {v, fa * a.dx + fb * b.dx, fa * a.dy + fb * b.dy, fa * a.dz + fb * b.dz};
-    return r;
+    return (dual){v, fa * a.dx + fb * b.dx, fa * a.dy + fb * b.dy, fa * a.dz + fb * b.dz};
 }
 
 // The chain rule for functions of three and four numbers: a row of a map's Jacobian times the J carried along.
 INLINE dual dual_chain3(real v, real fa, dual a, real fb, dual b, real fc, dual c) {
-    const dual r = {v, fa * a.dx + fb * b.dx + fc * c.dx, fa * a.dy + fb * b.dy + fc * c.dy,
-                    fa * a.dz + fb * b.dz + fc * c.dz};
-    return r;
+    return (dual){v, fa * a.dx + fb * b.dx + fc * c.dx, fa * a.dy + fb * b.dy + fc * c.dy, fa * a.dz + fb * b.dz + fc * c.dz};
 }
 INLINE dual dual_chain4(real v, real fa, dual a, real fb, dual b, real fc, dual c, real fd, dual d) {
-    const dual r = {v, fa * a.dx + fb * b.dx + fc * c.dx + fd * d.dx, fa * a.dy + fb * b.dy + fc * c.dy + fd * d.dy,
+    return (dual){v, fa * a.dx + fb * b.dx + fc * c.dx + fd * d.dx, fa * a.dy + fb * b.dy + fc * c.dy + fd * d.dy,
                     fa * a.dz + fb * b.dz + fc * c.dz + fd * d.dz};
-    return r;
 }
 
-INLINE dual dual_constant(real v) {
-    const dual r = {v, R(0.0), R(0.0), R(0.0)};
-    return r;
-}
+INLINE dual dual_constant(real v) { return (dual){v, R(0.0), R(0.0), R(0.0)}; }
 
 // The coordinates of the point themselves, and adding one of them: partials 1, 0, 0 and so on.
-INLINE dual dual_coordinate_x(real v) {
-    const dual r = {v, R(1.0), R(0.0), R(0.0)};
-    return r;
-}
-INLINE dual dual_coordinate_y(real v) {
-    const dual r = {v, R(0.0), R(1.0), R(0.0)};
-    return r;
-}
-INLINE dual dual_coordinate_z(real v) {
-    const dual r = {v, R(0.0), R(0.0), R(1.0)};
-    return r;
-}
-INLINE dual dual_add_coordinate_x(dual a, real v) {
-    const dual r = {a.v + v, a.dx + R(1.0), a.dy, a.dz};
-    return r;
-}
-INLINE dual dual_add_coordinate_y(dual a, real v) {
-    const dual r = {a.v + v, a.dx, a.dy + R(1.0), a.dz};
-    return r;
-}
-INLINE dual dual_add_coordinate_z(dual a, real v) {
-    const dual r = {a.v + v, a.dx, a.dy, a.dz + R(1.0)};
-    return r;
-}
-
-INLINE dual dual_add(dual a, dual b) {
-    const dual r = {a.v + b.v, a.dx + b.dx, a.dy + b.dy, a.dz + b.dz};
-    return r;
-}
-
-INLINE dual dual_sub(dual a, dual b) {
-    const dual r = {a.v - b.v, a.dx - b.dx, a.dy - b.dy, a.dz - b.dz};
-    return r;
-}
-
+INLINE dual dual_coordinate_x(real v) { return (dual){v, R(1.0), R(0.0), R(0.0)}; }
+INLINE dual dual_coordinate_y(real v) { return (dual){v, R(0.0), R(1.0), R(0.0)}; }
+INLINE dual dual_coordinate_z(real v) { return (dual){v, R(0.0), R(0.0), R(1.0)}; }
+INLINE dual dual_add_coordinate_x(dual a, real v) { return (dual){a.v + v, a.dx + R(1.0), a.dy, a.dz}; }
+INLINE dual dual_add_coordinate_y(dual a, real v) { return (dual){a.v + v, a.dx, a.dy + R(1.0), a.dz}; }
+INLINE dual dual_add_coordinate_z(dual a, real v) { return (dual){a.v + v, a.dx, a.dy, a.dz + R(1.0)}; }
+INLINE dual dual_add(dual a, dual b) { return (dual){a.v + b.v, a.dx + b.dx, a.dy + b.dy, a.dz + b.dz}; }
+INLINE dual dual_sub(dual a, dual b) { return (dual){a.v - b.v, a.dx - b.dx, a.dy - b.dy, a.dz - b.dz}; }
 INLINE dual dual_mul(dual a, dual b) { return dual_chain2(a.v * b.v, b.v, a, a.v, b); }
-INLINE dual dual_neg(dual a) {
-    const dual r = {-a.v, -a.dx, -a.dy, -a.dz};
-    return r;
-}
+INLINE dual dual_neg(dual a) { return (dual){-a.v, -a.dx, -a.dy, -a.dz}; }
 
 INLINE dual dual_div(dual a, dual b) {
     const real inverse = R(1.0) / b.v;
@@ -83,21 +43,9 @@ INLINE dual dual_div(dual a, dual b) {
     return dual_chain2(quotient, inverse, a, -quotient * inverse, b);
 }
 
-INLINE dual dual_add_real(dual a, real b) {
-    const dual r = {a.v + b, a.dx, a.dy, a.dz};
-    return r;
-}
-
-INLINE dual dual_sub_real(dual a, real b) {
-    const dual r = {a.v - b, a.dx, a.dy, a.dz};
-    return r;
-}
-
-INLINE dual real_sub_dual(real a, dual b) {
-    const dual r = {a - b.v, -b.dx, -b.dy, -b.dz};
-    return r;
-}
-
+INLINE dual dual_add_real(dual a, real b) { return (dual){a.v + b, a.dx, a.dy, a.dz}; }
+INLINE dual dual_sub_real(dual a, real b) { return (dual){a.v - b, a.dx, a.dy, a.dz}; }
+INLINE dual real_sub_dual(real a, dual b) { return (dual){a - b.v, -b.dx, -b.dy, -b.dz}; }
 INLINE dual dual_mul_real(dual a, real b) { return dual_chain(a.v * b, b, a); }
 INLINE dual dual_div_real(dual a, real b) { return dual_chain(a.v / b, R(1.0) / b, a); }
 INLINE dual real_div_dual(real a, dual b) {
@@ -109,8 +57,7 @@ INLINE dual real_div_dual(real a, dual b) {
 INLINE dual dual_square(dual a) { return dual_chain(a.v * a.v, a.v + a.v, a); }
 
 INLINE dual dual_where(mask m, dual yes, dual no) {
-    const dual r = {pick(m, yes.v, no.v), pick(m, yes.dx, no.dx), pick(m, yes.dy, no.dy), pick(m, yes.dz, no.dz)};
-    return r;
+    return (dual){pick(m, yes.v, no.v), pick(m, yes.dx, no.dx), pick(m, yes.dy, no.dy), pick(m, yes.dz, no.dz)};
 }
 
 // Slopes at a kink are one-sided or 0: anything finite is right there, NaN is not.
@@ -141,10 +88,7 @@ INLINE dual dual_exp(dual a) {
     return dual_chain(value, value, a);
 }
 
-INLINE dual dual_log(dual a) {
-    return dual_chain(real_log(a.v), pick(less((real)(LOG_SMALLEST), a.v), R(1.0) / a.v, R(0.0)), a);
-}
-
+INLINE dual dual_log(dual a) { return dual_chain(real_log(a.v), pick(less((real)(LOG_SMALLEST), a.v), R(1.0) / a.v, R(0.0)), a); }
 INLINE dual dual_sin(dual a) { return dual_chain(sin(a.v), cos(a.v), a); }
 INLINE dual dual_cos(dual a) { return dual_chain(cos(a.v), -sin(a.v), a); }
 INLINE dual dual_tan(dual a) {

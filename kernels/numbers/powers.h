@@ -59,8 +59,7 @@ INLINE complex_real inverse_where(complex_real w, int over) {
     if (!over) return w;
     const real square = w.re * w.re + w.im * w.im;
     const mask some = less(R(0.0), square);
-    const complex_real inverse = {pick(some, w.re / square, R(0.0)), pick(some, -(w.im / square), R(0.0))};
-    return inverse;
+    return (complex_real){pick(some, w.re / square, R(0.0)), pick(some, -(w.im / square), R(0.0))};
 }
 
 // (x + iy)^n.
@@ -107,6 +106,5 @@ INLINE complex_dual dual_complex_raised(dual x, dual y, scalar n, int twice) {
     const real square = x.v * x.v + y.v * y.v;
     const real part = pick(less(R(0.0), square), (real)(n) / square, R(0.0));
     const real u = (w.re * x.v + w.im * y.v) * part, v = (w.im * x.v - w.re * y.v) * part;
-    const complex_dual power = {dual_chain2(w.re, u, x, -v, y), dual_chain2(w.im, v, x, u, y)};
-    return power;
+    return (complex_dual){dual_chain2(w.re, u, x, -v, y), dual_chain2(w.im, v, x, u, y)};
 }

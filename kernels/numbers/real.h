@@ -21,9 +21,7 @@ INLINE real real_atan(real a) { return atan(a); }
 INLINE real real_where(mask m, real yes, real no) { return pick(m, yes, no); }
 
 // -1, 0 or 1; 0 at 0 and at NaN.
-INLINE real real_sign(real a) {
-    return pick(less(R(0.0), a), R(1.0), pick(less(a, R(0.0)), R(-1.0), R(0.0)));
-}
+INLINE real real_sign(real a) { return pick(less(R(0.0), a), R(1.0), pick(less(a, R(0.0)), R(-1.0), R(0.0))); }
 
 // 0 below 0.
 INLINE real real_sqrt(real a) { return sqrt(fmax(a, R(0.0))); }
@@ -52,9 +50,7 @@ INLINE real real_asin(real a) { return asin(real_clamp(a, R(-1.0), R(1.0))); }
 INLINE real real_acos(real a) { return acos(real_clamp(a, R(-1.0), R(1.0))); }
 
 // 0 at the origin, whatever the signs of the zeros.
-INLINE real real_atan2(real y, real x) {
-    return pick(equal(x, R(0.0)) & equal(y, R(0.0)), R(0.0), atan2(y, x));
-}
+INLINE real real_atan2(real y, real x) { return pick(equal(x, R(0.0)) & equal(y, R(0.0)), R(0.0), atan2(y, x)); }
 
 // x^y for an exponent that is not a constant whole number; 0 where x < 0 has no real power.
 INLINE real real_pow(real x, real y) {

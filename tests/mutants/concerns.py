@@ -55,7 +55,7 @@ kernels/solids*: render/joined
 kernels/solid_inside.h: voxels/
 kernels/solid_count.h: voxels/
 kernels/node_proof.h: voxels/
-kernels/fill_packets.h: voxels/
+kernels/bricks.h: voxels/
 clfractal/solids.py: voxels/joined_voxels render/joined
 kernels/trap*: render/coloring render/joined
 kernels/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
