@@ -1,14 +1,13 @@
-"""Renders a small picture of each kind, and leaves the texts of all programs that it takes: run by test_library_calls."""
+"""Renders a small picture of each kind; leaves each program's text and what is kept of it, for test_library_calls."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import clfractal
-from clfractal.device import isolate
+from clfractal.device import cache, program
 
 _HAST = {"name": "hast", "iterations": 20}
 _SUN = [{"direction": [0.5, 0.6, -0.62], "shadow": True}]
@@ -43,16 +42,18 @@ SCENES: tuple[dict[str, Any], ...] = (
 
 def main() -> None:
     folder = Path(sys.argv[1])
-    run = isolate.run
+    build = program.build
 
-    def recording(job: str, device: Any, arguments: Mapping[str, Any], **options: Any) -> Any:
-        if "text" in arguments:
-            number = len(list(folder.glob("*.cl")))
-            (folder / f"{number}.cl").write_text(arguments["text"], encoding="utf-8")
-        return run(job, device, arguments, **options)
+    def recording(device: Any, text: str, **options: Any) -> program.Program:
+        built = build(device, text, **options)
+        name = program._key(
+            device, *program._as_compiled(device, text, options["flags"]), options.get("warm", ())
+        )
+        (folder / f"{name}.cl").write_text(text, encoding="utf-8")
+        (folder / f"{name}.kept").write_bytes(cache.load_blob(name) or b"")
+        return built
 
-    # Programs are compiled in child processes, since nothing is in the cache.
-    isolate.run = recording
+    program.build = recording
     for scene in SCENES:
         clfractal.render(clfractal.load_scene(scene))
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import pytest
 
-from clfractal.device import cache, compiler, driver_files, isolate
+from clfractal.device import compiler, driver_files, isolate
 from clfractal.device.compiler import Warm
 from clfractal.device.program import math_flags
 from clfractal.device.select import Device, by_key, is_pocl
@@ -28,7 +28,10 @@ from clfractal.voxels import programs
 from clfractal.voxels.lattice import EXTENT
 from tests.shell import environment
 
-KERNELS = ("surface", "volume", "cut_plane", "fill_bricks", "store_bricks", "classify_bricks", "seen_blocks")
+KERNELS = (
+    *("begin_shots", "march_rays", "find_spots", "light_spots", "volume_medium", "cut_plane"),
+    *("fill_bricks", "store_bricks", "classify_nodes", "classify_bricks", "seen_blocks"),
+)
 
 # Functions that are too large to be written out, and what they call in turn (PoCL's `__pocl_...`).
 _TRANSCENDENTAL = "exp|exp2|log|log2|pow|sin|cos|tan|asin|acos|atan|atan2|sincos"
@@ -106,17 +109,14 @@ def rendered(device: Device, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with the texts of the programs of small pictures, and what PoCL made of them."""
     where = tmp_path_factory.mktemp("rendered")
     settings = {
-        "CLFRACTAL_CACHE": str(where / "cache"),
         "CLFRACTAL_LANES": str(best_lanes(device, "float32")),
         "CLFRACTAL_DEVICE": device.info.index,
     }
     command = [sys.executable, "-P", str(Path(__file__).with_name("render_and_record.py")), str(where)]
     ended = subprocess.run(command, env=environment(settings), capture_output=True, text=True, check=False)
     assert ended.returncode == 0, ended.stderr
-    for entry in (where / "cache" / "programs").glob("*.bin"):
-        with pytest.MonkeyPatch.context() as patch:
-            patch.setenv("CLFRACTAL_CACHE", str(where / "cache"))
-            lay_out(cache.load_blob(entry.stem) or b"", where / "pocl")
+    for path in where.glob("*.kept"):
+        lay_out(path.read_bytes(), where / "pocl")
     return where
 
 

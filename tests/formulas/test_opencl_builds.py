@@ -109,13 +109,6 @@ def test_every_formula_at_every_lane_count(precision: Precision) -> None:
             build_formulas(catalog.names(), precision, lanes)
 
 
-@pytest.mark.parametrize("coloring", ["solid", "normal", "iterations", "trap"])
-def test_every_coloring(coloring: str) -> None:
-    lanes = accepted_lanes(device(), "float32")[-1]
-    for text in surface_texts("hast", "float32", lanes, coloring)[1:]:
-        build(text, "float32")
-
-
 def test_stages_that_know_no_formula_are_the_same_for_all() -> None:
     """They are built once, the march once for a formula; what colours follow is data."""
     texts = [surface_texts(name, "float32", 4) for name in KINDS]
