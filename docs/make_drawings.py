@@ -326,9 +326,14 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
         ("meet_objects?", "march_rays? whether", "cross_media?", "end_paths?"),
     ),
 )
-# Kernels that stand in the place of one that is drawn: for single lanes, and for glass that scatters light.
+# Kernels that stand in the place of one that is drawn: for single lanes, points of pixels, the other search, cloudy glass.
 _BESIDE = {
-    "march_rays": ("look_at_surfaces",),
+    "march_rays": (
+        "look_at_surfaces",
+        "march_points",
+        "step_rays",
+        "look_where_steps_end",
+    ),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }
 _ASK_FORMULA = ("march_rays", "march_inside", "color_spots", "add_glow", "find_faces", "find_planes")

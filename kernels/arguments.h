@@ -36,6 +36,8 @@
 #define STAGE(name) __kernel void name(STAGE_ARGUMENTS)
 #endif
 #define STAGE_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects, settings->point_count > 1}
-// That of a march, which knows nothing of objects beside the set.
-#define MARCH_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, 0, settings->point_count > 1}
+// That of a march, which knows nothing of objects beside the set; `known`: whether something may be known of rays.
+#define MARCH_QUEUE(known) {rays, met, wave, turns, queue_stride, settings->met_numbers, 0, known}
+// The counts of the launch's first packet.
+#define STATISTICS_HERE (statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet))
 #define WAS_CANCELLED (*(volatile __constant const int *)&sampling->cancelled)

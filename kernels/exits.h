@@ -26,7 +26,7 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
     e.t = beyond - t;
     e.last = beyond - e.last;
     e.touch = R(0.0);
-    surface_at(r, &e, hit, settings, orbit, k);
+    surface_at(r, &e, hit, 0, settings, orbit, k);
     // A sheet without an inside lets rays straight through.
     const mask sheet = less_equal(t, r.near);
     e.normal = vec_pick(sheet, r.direction, vec_scale(e.normal, R(-1.0)));

@@ -13,7 +13,7 @@ STAGE(march_inside) {
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const int waits = march_share(mine, q, goal, settings, orbit, k);
-    look_along_share(mine, waits, q, statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet), settings, orbit, k);
+    look_along_share(mine, waits, q, STATISTICS_HERE, settings, orbit, k);
 }
 
 #if LANES == 1

@@ -16,7 +16,7 @@
 // Rays that do not land hit where light is computed:
 #define SEEN R(2.0)              // of the cone: the solid expected so near ahead is hit ...
 #define SEEN_BRACKETED R(0.5)    // ... and so is a bracket this narrow
-#define BRACKETED (HOLLOWS && POLISH ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
+#define BRACKETED (HOLLOWS && settings->polish ? R(0.005) : R(0.1))  // of the cone: a bracket this narrow is the surface
 #define LEAST_SLOPE R(0.1)       // no landing step is longer than ten distances ...
 #define GRAZING_SLOPE R(0.01)    // ... but a hit may lie farther ahead ...
 #define GRAZING_MOST R(2.0)      // ... at most so much of the cone
@@ -34,14 +34,15 @@
 #define BLIND_LEAST R(0.015625)  // ... but at least this part of the full step
 #define BLIND_GROWTH R(1.5)
 
+// A lane that is done takes a new ray at once. Packets that a work-item marches side by side: orbits over dual numbers fill a
+// processor's registers and units without that, and calls empty the registers.
+#define REFILL 1
+#define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && LANES > 1 ? 2 : 1)
+
 INLINE sight march_place(const march *m) {
     sight s;
     s.on_ray = vec_along(m->r.origin, m->t, m->r.direction);
-#if HAS_DERIVATIVE
-    s.point = s.on_ray;
-#else
-    s.point = vec_pick(m->proving, m->probe, s.on_ray);
-#endif
+    s.point = vec_pick(proof_under_way(m), m->probe, s.on_ray);
     return s;
 }
 
@@ -54,17 +55,18 @@ INLINE real near_of(clearance here, __constant const struct March *settings) {
 INLINE void march_blind(const march *m, sight *s, __constant const struct March *settings) {
     const real step = (real)(settings->step), first = fmax(BLIND_FIRST * s->cone, BLIND_LEAST * step);
     const real pace = fmin(fmax(BLIND_GROWTH * m->step_before, first), step);
-    const real most = s->here.most * step_scale_of(s->here, settings), free = fmin(fmax(fmax(pace, s->cone), s->radius), most);
+    const real most = s->here.most * step_scale_of(s->here, settings->step_scale), free = fmin(fmax(fmax(pace, s->cone), s->radius), most);
     const mask unknown = is_blind(s->here);
     s->blind = unknown & less(free, most);
     s->sure = pick(unknown & ~s->blind, free, s->radius);
     s->radius = pick(unknown, free, s->radius);
 }
 
-#if FAR_BOUNDS
 // Estimates are made for the inside of the formula's ball. Farther out they may be too large: there no step leads into it. How far the
-// ball is along the ray, and in `around` in any direction; beyond all where the ray does not meet it.
+// ball is along the ray, and in `around` in any direction; beyond all where the ray does not meet it, or none goes so far.
 INLINE real march_to_ball(const march *m, const sight *s, real *around, __constant const struct March *settings) {
+    *around = (real)(REAL_LARGEST);
+    if (!settings->goes_far) return *around;
     const vec arm = vec_sub(s->on_ray, vec_splat(settings->ball_center));
     const real radius = (real)(settings->ball_radius), away = sqrt(vec_dot(arm, arm)), ahead = -vec_dot(arm, m->r.direction);
     const vec nearest = vec_along(arm, ahead, m->r.direction);
@@ -73,16 +75,13 @@ INLINE real march_to_ball(const march *m, const sight *s, real *around, __consta
     *around = pick(far, away - radius, (real)(REAL_LARGEST));
     return pick(far & less(R(0.0), ahead) & less(R(0.0), square), ahead - sqrt(fmax(square, R(0.0))), (real)(REAL_LARGEST));
 }
-#endif
 
 // What the distance found at that place means for the march.
 INLINE void march_measure(march *m, sight *s, int goal, __constant const struct March *settings) {
-    mask free = less_equal((real)(REAL_LARGEST), m->high);
-#if !HAS_DERIVATIVE
-    free &= ~m->proving;
-#endif
+    const mask free = less_equal((real)(REAL_LARGEST), m->high) & ~proof_under_way(m);
+    s->to_ball = march_to_ball(m, s, &s->around, settings);
     s->cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    const real scale = step_scale_of(s->here, settings);
+    const real scale = step_scale_of(s->here, settings->step_scale);
     s->radius = s->here.step * scale;
     // Nothing is known where an orbit left the range of numbers at once: there rays go on as in the search by steps.
     s->radius = pick(less(s->radius, (real)(REAL_LARGEST)), s->radius, (real)(settings->step));
@@ -124,18 +123,14 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     const real relaxed = s->radius * pick(at_ball(s) | s->restless, R(1.0), longer);
     const real longest = pick(seeks_sheets(m, goal), LANDING_SHORT, LANDING_STEP) * s->cone;
     real step = pick(landing & ~s->restless, fmax(fmin(expected, longest), s->radius), relaxed);
-#if HAS_DERIVATIVE
     m->landing = (m->landing & ~marching) | landing;
-#else
-    m->landing = (m->landing & ~marching) | landing | (marching & less(step, CREEP * s->cone));
-    step = fmax(step, CREEP * s->cone);
-#endif
+    if (!HAS_DERIVATIVE) {
+        m->landing |= marching & less(step, CREEP * s->cone);
+        step = fmax(step, CREEP * s->cone);
+    }
     m->limit = pick(overshot & s->here.end.inside, m->t, m->limit);
     step = pick(s->blind, s->radius, step);
-#if FAR_BOUNDS
-    real around;
-    step = fmin(step, march_to_ball(m, s, &around, settings));
-#endif
+    step = fmin(step, s->to_ball);
     step = fmin(step, m->limit - m->t);
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
@@ -153,13 +148,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 // leaves its ray's part ends beyond everything.
 INLINE void march_cone(march *m, const sight *s, __constant const struct March *settings) {
     const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
-    real radius = s->radius;
-#if FAR_BOUNDS
-    real around;
-    march_to_ball(m, s, &around, settings);
-    radius = fmin(radius, around);
-#endif
-    const real free = (real)(settings->cone_share) * radius, square = free * free - s->cone * s->cone;
+    const real free = (real)(settings->cone_share) * fmin(s->radius, s->around), square = free * free - s->cone * s->cone;
     const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
     const mask known = less(s->here.step, (real)(REAL_LARGEST)) & ~is_blind(s->here);
     const mask onward = m->active & known & less(CONE_LEAST * s->cone, along) &
@@ -169,6 +158,19 @@ INLINE void march_cone(march *m, const sight *s, __constant const struct March *
     m->t += pick(onward, along, R(0.0));
     m->found.t = pick(m->active, pick(less(m->t, m->r.far), m->t, (real)(REAL_LARGEST)), m->found.t);
     m->active = onward & less(m->t, m->r.far);
+}
+
+// A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time, but not
+// out of the bounds: the lanes that do.
+INLINE mask march_too_early(march *m, mask inside, real cone, __constant const struct March *settings) {
+    const mask early = is_point(m) & inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->found.steps, BACK_STEPS);
+    if (any_lane(early)) {
+        ray whole = m->r;
+        whole.near = R(0.0);
+        ray_clip(&whole, settings->bounds_center, (real)(settings->bounds_radius));
+        m->low = pick(early, fmax(m->t - cone * m->found.steps, whole.near), m->low);
+    }
+    return early;
 }
 
 // What the active lanes do after a look; those that arrive, or leave their ray's part, are active no longer.
@@ -185,31 +187,16 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     const mask free = marching & less_equal((real)(REAL_LARGEST), m->high);
     const mask overshot = free & ~m->landing & less((s.sure + m->radius_before) * R(1.0001), m->step_before);
     mask inside = marching & ~overshot & s.here.end.inside;
-    mask early = inside & ~inside;
-#if POINTS > 1
-    // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time, but not
-    // out of the bounds.
-    early = inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->r.known, RAY_NOTHING_KNOWN) &
-            less(m->found.steps, BACK_STEPS);
+    const mask early = march_too_early(m, inside, cone, settings);
     inside &= ~early;
-    if (any_lane(early)) {
-        ray whole = m->r;
-        whole.near = R(0.0);
-        ray_clip(&whole, settings->bounds_center, (real)(settings->bounds_radius));
-        m->low = pick(early, fmax(m->t - cone * m->found.steps, whole.near), m->low);
-    }
-#endif
     const mask outside = marching & ~overshot & ~s.here.end.inside;
     // (Not where it has only just begun.)
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
     const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~s.blind & ~at_ball(&s);
     real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
-#if POINTS > 1
     // Points begin near the solid: their first look may be the last.
-    const mask is_point = less(m->r.known, RAY_NOTHING_KNOWN);
-    slope = pick(is_point & outside & ~knew, march_first_slope(m, &s, settings), slope);
-#endif
+    slope = pick(is_point(m) & outside & ~knew, march_first_slope(m, &s, settings), slope);
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
     m->slope = pick(s.blind, R(0.0), pick(at_ball(&s), SLOPE_AT_FIRST, m->slope));
     const mask passed = march_passed(m, &s, outside, inside, goal);
@@ -227,10 +214,8 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
             reach = cone * clamp(-SEEN * slope, LANDED_LEAST, (real)(settings->near));
             landed = outside;
         }
-#if POINTS > 1
-        landed |= is_point;
-        reach = pick(is_point, POINT_REACH * cone * clamp(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
-#endif
+        landed |= is_point(m);
+        reach = pick(is_point(m), POINT_REACH * cone * clamp(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
         touched &= landed;
     }
     touched &= less(s.near, pick(passed_between(m), LANDED_LEAST * cone, reach));
@@ -244,25 +229,19 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
     m->active &= ~done;
     march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, passed, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
-#if !HAS_DERIVATIVE
     // A lane that waits for others must not go on proving, or what it finds would depend on them.
     m->proving &= m->active;
-#endif
 }
 
 // One step of the active lanes.
 INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
                        __constant const scalar *k) {
     sight s = march_place(m);
-#if HAS_DERIVATIVE
-    s.here = orbit_scalar_distance(s.point, m->active, orbit, k);
-#else
-    s.here = orbit_dual_distance(s.point, m->active, OF_DISTANCE, orbit, k, &s.surface);
-#endif
+    if (HAS_DERIVATIVE) s.here = orbit_step(s.point, m->active, orbit, k);
+    else s.here = orbit_dual_distance(s.point, m->active, OF_DISTANCE, orbit, k, &s.surface);
     march_act(m, s, goal, settings, orbit);
 }
 
-#if HAS_DERIVATIVE
 // One step of two packets. Their orbits run side by side: an application is a chain of operations that wait for each other, and the
 // processor works on the other packet's meanwhile.
 INLINE void march_step_both(march *m, march *n, int goal, __constant const struct March *settings,
@@ -271,10 +250,9 @@ INLINE void march_step_both(march *m, march *n, int goal, __constant const struc
     const vec points[2] = {s.point, other.point};
     const mask active[2] = {m->active, n->active};
     clearance found[2];
-    orbit_scalar_distances(points, active, found, orbit, k);
+    orbit_steps(points, active, found, orbit, k);
     s.here = found[0];
     other.here = found[1];
     march_act(m, s, goal, settings, orbit);
     march_act(n, other, goal, settings, orbit);
 }
-#endif

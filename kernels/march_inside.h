@@ -11,6 +11,9 @@
 #define EXIT_NEARER R(0.25)         // part of the height over the exit at which the place beyond is looked for next
 #define EXIT_TRIES R(3.5)
 
+#define REFILL 1
+#define ABREAST 1
+
 typedef struct {
     ray r;
     mask active;

@@ -18,14 +18,13 @@ typedef struct {
     real slope;       // of the distance along the ray, over the last steps
     real radius_before, step_before;
     mask landing;     // the last step led to where the solid is expected
-#if !HAS_DERIVATIVE
+    // Of formulas without a scalar rule, whose hits are proved, and which may have sheets (see passed.h and proof.h):
     real facing;      // the cosine between the gradient at the last point before a surface and the ray
     real behind;      // a point at which the gradient follows the ray: the distance is least between `low` and this one
     mask proving;
     vec probe, probe_downhill;
     real probe_radius, probes, factor, proved_t;
     real retry_t, retry_radius;   // the next proof is due from this t on, or below this distance
-#endif
 } march;
 
 // What an evaluation tells: at a place on the ray, or where a hit is being proved.
@@ -36,15 +35,12 @@ typedef struct {
     mask restless;             // the distance has just grown, near the solid: it may be too large
     mask blind;                // in a hollow nobody knows how far the solid is ...
     real sure;                 // ... but for what is free at least; else the radius
-#if !HAS_DERIVATIVE
-    surface_point surface;
-#endif
+    real to_ball, around;      // see march_to_ball
+    surface_point surface;     // without a scalar rule
 } sight;
 
-// Part of a distance that is safe to go.
-INLINE real step_scale_of(clearance here, __constant const struct March *settings) {
-    return JOINED ? here.scale : (real)(settings->step_scale);
-}
+// Rays of a pixel's points: of these something is known.
+INLINE mask is_point(const march *m) { return less(m->r.known, RAY_NOTHING_KNOWN); }
 
 // What is cut out leaves hollows.
 #define HOLLOWS (JOINED && settings->hollows)
@@ -65,7 +61,7 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->radius_before = pick(fresh, (real)(REAL_LARGEST), m->radius_before);
     m->step_before = pick(fresh, R(0.0), m->step_before);
     m->landing &= ~fresh;
-#if !HAS_DERIVATIVE
+    if (HAS_DERIVATIVE) return;
     m->facing = pick(fresh, R(0.0), m->facing);
     m->behind = pick(fresh, (real)(REAL_LARGEST), m->behind);
     m->proving &= ~fresh;
@@ -77,6 +73,5 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->proved_t = pick(fresh, R(0.0), m->proved_t);
     m->retry_t = pick(fresh, R(0.0), m->retry_t);
     m->retry_radius = pick(fresh, R(0.0), m->retry_radius);
-#endif
 }
 

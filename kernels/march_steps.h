@@ -12,6 +12,10 @@
 #define SHADOW_FIRST R(2.0)   // step, in the ray's footprints
 #define SHADOW_GROWTH R(1.5)
 
+// Steps are too cheap, and those of neighbours too alike, for a pause before all lanes are done.
+#define REFILL LANES
+#define ABREAST 1
+
 typedef struct {
     ray r;
     mask active;

@@ -112,100 +112,6 @@ INLINE mask formula_inside(vec point, mask active, int limit, __constant const s
     return formula_end(point, active, limit, orbit, k).inside;
 }
 
-#if HAS_DERIVATIVE
-// An orbit under way that carries the formula's own scalar derivative.
-typedef struct {
-    state c, z;
-    real growth, square, count;
-    mask alive, inside;
-} scalar_orbit;
-
-INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __constant const struct Orbit *orbit,
-                               __constant const scalar *k) {
-    start(point, k, &o->c, &o->z);
-    o->growth = R(1.0);
-    o->square = state_square(o->z);
-    o->count = (real)((scalar)FIRST_COUNT);
-    o->alive = active & less_equal(o->square, (real)(orbit->distance_square));
-    o->inside = o->alive & ~o->alive;
-}
-
-INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    real next_growth = o->growth;
-    const state next = apply_derivative_by(usual, n, o->z, o->c, &next_growth, k);
-    o->z = state_pick(o->alive, next, o->z);
-    o->growth = pick(o->alive, next_growth, o->growth);
-    o->square = pick(o->alive, state_square(next), o->square);
-    o->count = pick(o->alive, (real)((scalar)(n + 1)), o->count);
-    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
-}
-
-// The distance by this derivative: |z| / g with g carried as one number.
-INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    mask inside = o->inside;
-    if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
-    real distance;
-    if (HAS_SHAPE) {
-        const real solid = solid_distance(o->z, k);
-        distance = fmax(solid / o->growth, R(0.0));
-        inside = active & less_equal(solid, R(0.0));
-    } else {
-        distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
-    }
-    const real step = pick(inside, R(0.0), distance);
-    const clearance result = {step, {o->count, inside}, step};
-    return result;
-}
-
-INLINE clearance scalar_distance_by(int usual, vec point, mask active, __constant const struct Orbit *orbit,
-                                    __constant const scalar *k) {
-    scalar_orbit o;
-    scalar_orbit_begin(&o, point, active, orbit, k);
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look && orbit_look(n, &look, o.square, &o.alive, &o.inside, orbit)) break;
-        if (!any_lane(o.alive)) break;
-        scalar_orbit_apply(usual, &o, n, orbit, k);
-    }
-    return scalar_orbit_end(&o, active, orbit, k);
-}
-
-INLINE clearance formula_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
-    if (has_usual_values(k)) return scalar_distance_by(1, point, active, orbit, k);
-    return scalar_distance_by(0, point, active, orbit, k);
-}
-
-// The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
-// on the other packet's meanwhile.
-INLINE void scalar_distances_by(int usual, const vec *points, const mask *active, clearance *found,
-                                __constant const struct Orbit *orbit, __constant const scalar *k) {
-    scalar_orbit a, b;
-    scalar_orbit_begin(&a, points[0], active[0], orbit, k);
-    scalar_orbit_begin(&b, points[1], active[1], orbit, k);
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        int next_look = look;
-        if (n == look && (orbit_look(n, &next_look, a.square, &a.alive, &a.inside, orbit) |
-                          orbit_look(n, &look, b.square, &b.alive, &b.inside, orbit))) break;
-        // One of them may go on for long.
-        const int first = any_lane(a.alive), second = any_lane(b.alive);
-        if (!(first | second)) break;
-        if (first) scalar_orbit_apply(usual, &a, n, orbit, k);
-        if (second) scalar_orbit_apply(usual, &b, n, orbit, k);
-    }
-    found[0] = scalar_orbit_end(&a, active[0], orbit, k);
-    found[1] = scalar_orbit_end(&b, active[1], orbit, k);
-}
-
-CALLED void other_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
-                                   __constant const scalar *k) {
-    scalar_distances_by(0, points, active, found, orbit, k);
-}
-INLINE void formula_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
-                                     __constant const scalar *k) {
-    if (has_usual_values(k)) scalar_distances_by(1, points, active, found, orbit, k);
-    else other_scalar_distances(points, active, found, orbit, k);
-}
-#endif
-
 // Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
 //
 // The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
@@ -290,11 +196,104 @@ INLINE real formula_potential(orbit_end end, surface_point surface, __constant c
 }
 
 // The distance used for marching: the cheapest that the formula offers.
-INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
 #if HAS_DERIVATIVE
-    return formula_scalar_distance(point, active, orbit, k);
+// An orbit under way that carries the formula's own scalar derivative.
+typedef struct {
+    state c, z;
+    real growth, square, count;
+    mask alive, inside;
+} scalar_orbit;
+
+INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __constant const struct Orbit *orbit,
+                               __constant const scalar *k) {
+    start(point, k, &o->c, &o->z);
+    o->growth = R(1.0);
+    o->square = state_square(o->z);
+    o->count = (real)((scalar)FIRST_COUNT);
+    o->alive = active & less_equal(o->square, (real)(orbit->distance_square));
+    o->inside = o->alive & ~o->alive;
+}
+
+INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    real next_growth = o->growth;
+    const state next = apply_derivative_by(usual, n, o->z, o->c, &next_growth, k);
+    o->z = state_pick(o->alive, next, o->z);
+    o->growth = pick(o->alive, next_growth, o->growth);
+    o->square = pick(o->alive, state_square(next), o->square);
+    o->count = pick(o->alive, (real)((scalar)(n + 1)), o->count);
+    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
+}
+
+// The distance by this derivative: |z| / g with g carried as one number.
+INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    mask inside = o->inside;
+    if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
+    real distance;
+    if (HAS_SHAPE) {
+        const real solid = solid_distance(o->z, k);
+        distance = fmax(solid / o->growth, R(0.0));
+        inside = active & less_equal(solid, R(0.0));
+    } else {
+        distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
+    }
+    const real step = pick(inside, R(0.0), distance);
+    const clearance result = {step, {o->count, inside}, step};
+    return result;
+}
+
+INLINE clearance scalar_distance_by(int usual, vec point, mask active, __constant const struct Orbit *orbit,
+                                    __constant const scalar *k) {
+    scalar_orbit o;
+    scalar_orbit_begin(&o, point, active, orbit, k);
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        if (n == look && orbit_look(n, &look, o.square, &o.alive, &o.inside, orbit)) break;
+        if (!any_lane(o.alive)) break;
+        scalar_orbit_apply(usual, &o, n, orbit, k);
+    }
+    return scalar_orbit_end(&o, active, orbit, k);
+}
+
+INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (has_usual_values(k)) return scalar_distance_by(1, point, active, orbit, k);
+    return scalar_distance_by(0, point, active, orbit, k);
+}
+
+// The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
+// on the other packet's meanwhile.
+INLINE void scalar_distances_by(int usual, const vec *points, const mask *active, clearance *found,
+                                __constant const struct Orbit *orbit, __constant const scalar *k) {
+    scalar_orbit a, b;
+    scalar_orbit_begin(&a, points[0], active[0], orbit, k);
+    scalar_orbit_begin(&b, points[1], active[1], orbit, k);
+    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
+        int next_look = look;
+        if (n == look && (orbit_look(n, &next_look, a.square, &a.alive, &a.inside, orbit) |
+                          orbit_look(n, &look, b.square, &b.alive, &b.inside, orbit))) break;
+        // One of them may go on for long.
+        const int first = any_lane(a.alive), second = any_lane(b.alive);
+        if (!(first | second)) break;
+        if (first) scalar_orbit_apply(usual, &a, n, orbit, k);
+        if (second) scalar_orbit_apply(usual, &b, n, orbit, k);
+    }
+    found[0] = scalar_orbit_end(&a, active[0], orbit, k);
+    found[1] = scalar_orbit_end(&b, active[1], orbit, k);
+}
+
+CALLED void other_scalar_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
+    scalar_distances_by(0, points, active, found, orbit, k);
+}
+
+INLINE void formula_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
+    if (has_usual_values(k)) scalar_distances_by(1, points, active, found, orbit, k);
+    else other_scalar_distances(points, active, found, orbit, k);
+}
 #else
+INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
     surface_point ignored;
     return formula_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
-#endif
 }
+
+INLINE void formula_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
+    for (int i = 0; i < 2; ++i) found[i] = formula_distance(points[i], active[i], orbit, k);
+}
+#endif

@@ -19,19 +19,7 @@
 #define TOUCH_STEPS R(8.0)
 #define TOUCH_ONWARD R(1.0)
 
-#if HAS_DERIVATIVE
-INLINE mask proof_under_way(const march *m) { return m->active & ~m->active; }
-
-INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
-    return m->active;
-}
-
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
-                        __constant const struct March *settings) {
-    return touched;
-}
-#else
-INLINE mask proof_under_way(const march *m) { return m->proving; }
+INLINE mask proof_under_way(const march *m) { return HAS_DERIVATIVE ? m->active & ~m->active : m->proving; }
 
 // The whole cone of a pixel is looked through for its points.
 INLINE real proof_reach(int goal) { return goal == GOAL_TOUCH ? R(1.0) : PROOF_REACH; }
@@ -42,7 +30,7 @@ INLINE real proof_most(int goal) { return goal == GOAL_TOUCH ? TOUCH_STEPS : PRO
 
 // Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
 INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
-    if (!any_lane(m->proving)) return m->active;
+    if (HAS_DERIVATIVE || !any_lane(m->proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
     const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->set_radius), PROOF_LOW * cone);
@@ -74,10 +62,8 @@ INLINE mask proof_step(march *m, const sight *s, int goal, __constant const stru
 // bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
 INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
                         __constant const struct March *settings) {
-    mask done = touched & bracketed;
-#if POINTS > 1
-    done |= touched & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone);
-#endif
+    if (HAS_DERIVATIVE) return touched;
+    const mask done = touched & (bracketed | (is_point(m) & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone)));
     const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
     if (!any_lane(m->proving | due)) return done;
     const vec downhill = vec_scale(vec_normalize(s->surface.gradient), R(-1.0));
@@ -89,13 +75,10 @@ INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, 
     m->proved_t = pick(due, hit_t, m->proved_t);
     m->proving |= due;
     real down = m->factor * fmax(s->radius, PROOF_LANDED * s->cone);
-#if POINTS > 1
     // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
     if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * proof_reach(goal) * s->cone);
-#endif
     m->probe = vec_pick(m->proving, vec_along(s->point, down, downhill), m->probe);
     m->probe_downhill = downhill;
     m->probe_radius = s->radius;
     return done;
 }
-#endif

@@ -1,11 +1,6 @@
 // How a work-item marches its share of a queue: its lanes take ray after ray, so that none waits for others.
 
-// Idle lanes that are worth a pause for new rays. The steps of the search by steps are too cheap, and those of neighbours too alike.
-#define REFILL (SEARCH == SEARCH_STEPS ? LANES : 1)
-
-// Packets that a work-item marches side by side. Orbits over dual numbers fill a processor's registers and units without that, and
-// calls empty the registers.
-#define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && SEARCH == SEARCH_DISTANCE && LANES > 1 ? 2 : 1)
+// From each search: REFILL, idle lanes that are worth a pause for new rays, and ABREAST, packets that are marched side by side.
 
 // The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
 typedef struct {
@@ -56,9 +51,6 @@ INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q,
 #define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
     WRITTEN_OUT(ENCOUNTER_NORMAL, HOLD_FOUND)
     ray next = m->r;
-#if POINTS == 1
-    next.known = RAY_NOTHING_KNOWN;
-#endif
     const int count = goal == GOAL_SHADOW || goal == GOAL_CONE ? SHADOW_NUMBERS : ENCOUNTER_NORMAL;
     uint fresh = 0;
     while (idle != 0) {
@@ -72,7 +64,8 @@ INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q,
         if (next_place < 0) continue;
         const mask here = lanes_of_bits(1u << lane);
 #define TAKE_NUMBER(i) ((real *)&next)[i] = pick(here, (real)(q.rays[i * q.stride + next_place]), ((real *)&next)[i]);
-        WRITTEN_OUT(POINTS > 1 ? NUMBERS_OF(ray) : RAY_SENT, TAKE_NUMBER)
+        WRITTEN_OUT(RAY_SENT, TAKE_NUMBER)
+        if (q.known) TAKE_NUMBER(RAY_KNOWN)
         fresh |= 1u << lane;
     }
     march_begin(m, next, lanes_of_bits(fresh), goal, settings);
@@ -80,6 +73,7 @@ INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q,
 
 INLINE void lanes_begin(march *m, int *places) {
     m->active = less(R(1.0), R(0.0));
+    m->r.known = RAY_NOTHING_KNOWN;
     for (int lane = 0; lane < LANES; ++lane) places[lane] = -1;
 }
 

@@ -119,23 +119,24 @@ INLINE clearance orbit_behind(vec point, mask active, __constant const struct Or
     return solids_distance(&point, active, ASK_BEHIND, orbit, k, surface);
 }
 
-#if HAS_DERIVATIVE
-INLINE clearance orbit_scalar_distance(vec point, mask active, __constant const struct Orbit *orbit,
-                                       __constant const scalar *k) {
-    if (!JOINED) return formula_scalar_distance(point, active, orbit, k);
+// How far rays may go: by the scalar rule, if the formulas have one.
+INLINE clearance orbit_step(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+    if (!JOINED) return formula_distance(point, active, orbit, k);
     surface_point ignored;
     return solids_distance(&point, active, ASK_STEP, orbit, k, &ignored);
 }
 
-INLINE void orbit_scalar_distances(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
-                                   __constant const scalar *k) {
+INLINE void orbit_steps(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
+                        __constant const scalar *k) {
     if (!JOINED) {
-        formula_scalar_distances(points, active, found, orbit, k);
+        formula_distances(points, active, found, orbit, k);
         return;
     }
-    for (int i = 0; i < 2; ++i) found[i] = orbit_scalar_distance(points[i], active[i], orbit, k);
+    for (int i = 0; i < 2; ++i) found[i] = orbit_step(points[i], active[i], orbit, k);
 }
-#endif
+
+// Which part of a distance rays may go; `own`: of a formula by itself.
+INLINE real step_scale_of(clearance here, scalar own) { return JOINED ? here.scale : (real)(own); }
 
 // Which points belong to the solid of `limit` applications, if that is not the scene's own limit; then each has its own.
 CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __constant const struct Orbit *orbit,

@@ -80,7 +80,6 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
     return surface;
 }
 
-#if POLISH
 #define POLISH_HEIGHT R(0.16667)
 // A place that does not depend on how the march came there: where the distance is a sixth of the cone, by the secant method (the
 // slope is that of a distance, -1, at first). Normals from the positions of points need it.
@@ -91,14 +90,14 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
     const real wanted = POLISH_HEIGHT * cone;
     real t = met->touch, before = t, height_before = R(0.0);
     mask moves = active;
-    for (int i = 0; i < TURNS(POLISH); ++i) {
+    for (int i = 0; i < settings->polish; ++i) {
         *there = orbit_dual_distance(vec_along(r.origin, t, r.direction), active, OF_SURFACE, orbit, k, &surface);
         met->more_count += pick(active, there->end.count, R(0.0));
         met->more_steps += pick(active, R(1.0), R(0.0));
-        if (i == POLISH - 1) break;
+        if (i == settings->polish - 1) break;
         // What the bounds have cut is where the ray begins, and a wall of a hollow where its bracket is.
         if (i == 0) moves &= ~there->end.inside;
-        const real height = pick(is_blind(*there), R(0.0), there->step * step_scale_of(*there, settings) - wanted);
+        const real height = pick(is_blind(*there), R(0.0), there->step * step_scale_of(*there, settings->step_scale) - wanted);
         const real slope = (height - height_before) / (t - before);
         const mask usable = less(slope, R(0.0)) & less(R(-1e6), slope);
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
@@ -110,21 +109,22 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
     met->t = pick(active, t, met->t);
     return surface;
 }
-#endif
 
-// The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded.
-INLINE void surface_at(ray r, encounter *met, mask active, __constant const struct March *settings,
+// The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
+// exactly it is may matter.
+INLINE void surface_at(ray r, encounter *met, mask active, int polished, __constant const struct March *settings,
                        __constant const struct Orbit *orbit, __constant const scalar *k) {
     met->touch = fmin(met->touch, met->last);
     clearance there;
     vec normal;
     met->more_steps = met->more_count = R(0.0);
-#if POLISH
-    surface_point surface = surface_polished(r, met, active, settings, orbit, k, &there);
-    normal = vec_normalize(surface.gradient);
-#else
-    surface_point surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
-#endif
+    surface_point surface;
+    if (polished && settings->polish) {
+        surface = surface_polished(r, met, active, settings, orbit, k, &there);
+        normal = vec_normalize(surface.gradient);
+    } else {
+        surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
+    }
     if (JOINED) surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
     // No gradient: inside the solid already where the ray begins, or an extremum. What the bounds cut has their normal; else face
     // the viewer.
@@ -144,14 +144,14 @@ INLINE void surface_at(ray r, encounter *met, mask active, __constant const stru
     met->part = surface.share;
 }
 
-// Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and with POLISH where
-// exactly they are.
+// Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and where exactly
+// they are, if that matters.
 INLINE void look_at(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
                     __constant const scalar *k) {
     encounter e = queue_met(q, 0, at);
     const mask hit = mask_of(e.hit);
     if (!any_lane(hit)) return;
-    surface_at(queue_ray(q, 0, at), &e, hit, settings, orbit, k);
+    surface_at(queue_ray(q, 0, at), &e, hit, q.known, settings, orbit, k);
     encounter_keep_surface(q, at, &e);
 }
 
@@ -161,4 +161,13 @@ INLINE void look_at_share(share mine, queue q, int goal, __constant const struct
                           __constant const scalar *k) {
     if (LANES == 1 || (goal != GOAL_SURFACE && goal != GOAL_POINT)) return;
     for (int at = mine.next; at < mine.end; at += LANES) look_at(q, at, settings, orbit, k);
+}
+
+// Marches a share, and looks at the surfaces that it meets; `waiting` counts the steps that lanes have waited.
+INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting, __constant const struct March *settings,
+                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+    const int waits = march_share(mine, q, goal, settings, orbit, k);
+    look_at_share(mine, q, goal, settings, orbit, k);
+    // Nobody counts those of the cones.
+    if (LANES > 1 && goal != GOAL_CONE) atomic_add(waiting, (uint)waits);
 }

@@ -1,6 +1,4 @@
 // Normals of the samples that a ray meets the surface between, from the formula itself. One work-item takes a brick.
-//
-// From the build: NORMALS_LEAST_SQUARES, NORMALS_EXACT and which of them NORMALS is.
 #include "orbits.h"
 #include "normals.h"
 #include "voxels.h"
@@ -103,24 +101,12 @@ INLINE void find_surface(const lines *l, real side, real *place, mask *found, or
     for (int p = 0; p < TURNS(PACKETS); ++p) place[p] = outer[p];
 }
 
-#if NORMALS == NORMALS_EXACT
-// From the Jacobian just outside the surface.
-INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, orbit_record orbit, constants k) {
-    real place[PACKETS];
-    find_surface(l, side, place, usable, orbit, k);
-    for (int p = 0; p < TURNS(PACKETS); ++p) {
-        surface_point surface;
-        orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], OF_SURFACE, orbit, k, &surface);
-        normal[p] = vec_normalize(surface.gradient);
-        usable[p] &= less(R(0.5), vec_dot(normal[p], normal[p]));
-    }
-}
-#else
-// Eq. 7-10: the plane through points of the surface on lines along -G, in a frame with that as its third axis, so that steep
-// faces work.
-INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable, orbit_record orbit, constants k) {
+// From the Jacobian just outside the surface, or Eq. 7-10: the plane through points of the surface on lines along -G, in a frame with that
+// as its third axis, so that steep faces work.
+INLINE void surface_normals(const lines *l, int exact, real side, vec *normal, mask *usable, orbit_record orbit, constants k) {
     vec across[PACKETS], up[PACKETS];
     plane_sums sums[PACKETS];
+    real place[PACKETS];
     lines line = *l;
     for (int p = 0; p < TURNS(PACKETS); ++p) {
         const vec n = l->out[p];
@@ -130,23 +116,28 @@ INLINE void surface_normals(const lines *l, real side, vec *normal, mask *usable
         up[p] = vec_cross(n, across[p]);
         sums[p] = plane_none();
     }
+    const int middle = LINES / 2, last = exact ? middle + 1 : LINES;
     #pragma unroll 1
-    for (int i = 0; i < TURNS(LINES); ++i) {
+    for (int i = exact ? middle : 0; i < last; ++i) {
         const real x = side * (real)(LINE_STEP) * (real)((scalar)(i % 3 - 1));
         const real y = side * (real)(LINE_STEP) * (real)((scalar)(i / 3 - 1));
-        real place[PACKETS];
-        mask found[PACKETS];
         for (int p = 0; p < TURNS(PACKETS); ++p) line.from[p] = vec_along(vec_along(l->from[p], x, across[p]), y, up[p]);
-        find_surface(&line, side, place, found, orbit, k);
-        for (int p = 0; p < TURNS(PACKETS); ++p) sums[p] = plane_add(sums[p], found[p], vec_of(x, y, place[p]));
+        find_surface(&line, side, place, usable, orbit, k);
+        for (int p = 0; p < TURNS(PACKETS); ++p) sums[p] = plane_add(sums[p], usable[p], vec_of(x, y, place[p]));
     }
     for (int p = 0; p < TURNS(PACKETS); ++p) {
-        real residual;
-        const vec plane = plane_normal(sums[p], &residual, &usable[p]);
-        normal[p] = vec_along(vec_along(vec_scale(l->out[p], plane.z), plane.x, across[p]), plane.y, up[p]);
+        if (exact) {
+            surface_point surface;
+            orbit_dual_distance(vec_along(l->from[p], place[p], l->out[p]), usable[p], OF_SURFACE, orbit, k, &surface);
+            normal[p] = vec_normalize(surface.gradient);
+            usable[p] &= less(R(0.5), vec_dot(normal[p], normal[p]));
+        } else {
+            real residual;
+            const vec plane = plane_normal(sums[p], &residual, &usable[p]);
+            normal[p] = vec_along(vec_along(vec_scale(l->out[p], plane.z), plane.x, across[p]), plane.y, up[p]);
+        }
     }
 }
-#endif
 
 // Normals of the bricks from `first` on, in slots from `slot` on: those by differences are where the search begins, and stay
 // where it finds nothing.
@@ -185,7 +176,7 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
         }
         vec found[PACKETS];
         mask usable[PACKETS];
-        surface_normals(&l, side, found, usable, orbit, k);
+        surface_normals(&l, lattice->exact_normals, side, found, usable, orbit, k);
         for (int p = 0; p < TURNS(PACKETS); ++p) {
             scalar n[3][LANES], good[LANES];
             vec_store(found[p], n);

@@ -19,7 +19,7 @@ STAGE(walk_inside) {
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const world w = WORLD;
     const int waits = walk_share(mine, q, state, wave + STATE_PADDING, bounce, w, orbit, k);
-    look_along_share(mine, waits, q, statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet), settings, orbit, k);
+    look_along_share(mine, waits, q, STATISTICS_HERE, settings, orbit, k);
 }
 
 #if LANES == 1

@@ -49,6 +49,18 @@ MARCH = Struct(
             "cone_margin", "real", 0, "what a block's cone is wider than its rays, in footprints over detail"
         ),
         Field("cone_share", "real", 0, "part of a scaled distance that is free for all of a block"),
+        Field(
+            "goes_far",
+            "int",
+            0,
+            "1: rays look for the set beyond that ball, where estimates may be too large",
+        ),
+        Field(
+            "polish",
+            "int",
+            0,
+            "distances that bring a place to a fixed part of its footprint from the set; 0: it stays",
+        ),
         Field("max_steps", "int", 0, "most distance evaluations along a ray"),
         Field("hollows", "int", 0, "1: what is cut out leaves hollows, in which no distance is known"),
         Field(
@@ -115,6 +127,8 @@ TOUCH = 0.7
 KNOWN_REACH = 4.0
 # Of a scaled distance along its gradient: where a surface is smooth, it is half of the true one.
 FIRST_SLOPE = 0.5
+# Distances that bring a point to a fixed part of its footprint from the set.
+POLISH = 5
 # In footprints: how far before the end of their pixel's march the points begin.
 POINT_START = 0.5
 
@@ -139,6 +153,13 @@ def features_of(scene: Scene) -> int:
         "clouds": along_paths(scene) and bool(clouds_of(scene)),
     }
     return sum(FEATURES[name] for name, there in has.items() if there)
+
+
+def searches_far(scene: Scene) -> bool:
+    """Whether rays look for the set farther out than its formula says that it is, and estimates are made for."""
+    center, radius = scene.bounds
+    apart = math.dist(center, scene.chain.center)
+    return scene.surface.bounds is not None and apart + radius > scene.chain.radius
 
 
 def uses_positions(scene: Scene) -> bool:
@@ -193,6 +214,9 @@ def march_record(
         "shadow_detail": shadow * fineness.level / fineness.detail,
         "cone_margin": max(CONE_MARGIN * fineness.near, 1.5 * touch),
         "cone_share": CONE_SHARE,
+        "goes_far": int(searches_far(scene)),
+        # A binary search ends where the surface is; a march, somewhere within the point's footprint.
+        "polish": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
         "max_steps": renderer.max_steps,
         "hollows": int(has_hollows(scene)),
         # A distance of degree 1 is the true one.

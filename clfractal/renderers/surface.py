@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
@@ -29,7 +28,7 @@ from clfractal.renderers.kernel import (
     flat_text,
 )
 from clfractal.renderers.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
-from clfractal.renderers.march import march_record, uses_positions
+from clfractal.renderers.march import march_record
 from clfractal.renderers.materials import PBR, pbr_text, scattering_defines
 from clfractal.renderers.object_grids import ObjectGrids
 from clfractal.renderers.objects import object_defines, object_records
@@ -56,48 +55,12 @@ from clfractal.scene.model import Scene
 from clfractal.solids import Body, Turns
 
 PALETTE_SIZE = 256
-# Distance evaluations that bring a point to a fixed part of its footprint from the set.
-POLISH = 5
-# Neither search of `search_defines`: rays within the set have one of their own.
-SEARCH_INSIDE = 2
 Floats = npt.NDArray[np.float32]
 
 
-def search_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """How the surface is searched, as far as the text of `kernels/march.cl` depends on it."""
-    renderer = scene.surface
-    return {
-        **pass_defines(plan),
-        "SEARCH_DISTANCE": 0,
-        "SEARCH_STEPS": 1,
-        "SEARCH": int(renderer.search == "steps"),
-        "FAR_BOUNDS": int(searches_far(scene)),
-        "POINTS": several_points(scene),
-        # A binary search ends where the surface is; a march, somewhere within the point's footprint.
-        "POLISH": POLISH if uses_positions(scene) and renderer.search == "distance" else 0,
-    }
-
-
-def searches_far(scene: Scene) -> bool:
-    """Whether rays look for the set farther out than its formula says that it is, and estimates are made for."""
-    center, radius = scene.bounds
-    apart = math.dist(center, scene.chain.center)
-    return scene.surface.bounds is not None and apart + radius > scene.chain.radius
-
-
-def inside_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """How rays within a set of glass go on, as far as the text of `kernels/glass.cl` depends on it."""
-    return {**search_defines(scene, plan), "SEARCH": SEARCH_INSIDE, "POLISH": 0}
-
-
-def walk_defines(scene: Scene, plan: Plan) -> dict[str, object]:
-    """The same of `kernels/walks.cl`: walks know what paths carry, and what may stand in their way."""
-    return {**inside_defines(scene, plan), **state_defines(scene, plan)}
-
-
-def several_points(scene: Scene) -> int:
-    """2 if a pixel has several points, for programs that need not know how many."""
-    return min(scene.surface.used_points.count, 2)
+def march_defines(scene: Scene, plan: Plan) -> dict[str, object]:
+    """The defines of programs that march, and know nothing of what is kept between stages."""
+    return dict(pass_defines(plan))
 
 
 def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
@@ -105,7 +68,6 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
     return {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
-        "POINTS": several_points(scene),
         "STATE_PADDING": STATE_PADDING,
         **object_defines(scene),
         **MAP_DEFINES,
@@ -220,7 +182,9 @@ class _Program:
 
 # A scene needs those whose stages it launches.
 PROGRAMS = (
-    _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), search_defines, formula=True),
+    _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), march_defines, formula=True),
+    _Program("point_rays", "march.cl", ("march_points", "look_at_surfaces"), march_defines, formula=True),
+    _Program("steps", "march_steps.cl", ("step_rays", "look_where_steps_end"), march_defines, formula=True),
     _Program("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
     _Program("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
@@ -231,8 +195,8 @@ PROGRAMS = (
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     _Program("media", "media.cl", ("cross_media", "pass_clouds"), path_defines),
-    _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), inside_defines, formula=True),
-    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), walk_defines, formula=True),
+    _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), march_defines, formula=True),
+    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), state_defines, formula=True),
     _Program("colors", "color_spots.cl", ("color_spots",), state_defines, formula=True),
     _Program("glow", "glow.cl", ("add_glow",), state_defines, formula=True),
     _Program(

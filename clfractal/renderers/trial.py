@@ -98,16 +98,7 @@ def picture_side(device: Device, rule: Rule) -> int:
 
 def program_text(formula: FormulaText, lanes: int, precision: Precision) -> FlatText:
     """The whole text of the program that marches for a measurement."""
-    defines = {
-        "LANES": lanes,
-        "REAL_IS_DOUBLE": int(precision == "float64"),
-        "SEARCH_DISTANCE": 0,
-        "SEARCH_STEPS": 1,
-        "SEARCH": 0,
-        "POINTS": 1,
-        "POLISH": 0,
-        "FAR_BOUNDS": 0,
-    }
+    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
     generated = {"structs.h": struct_text(), "formula.h": formula.text}
     return flatten("march_probe.cl", generated=generated, defines=defines)
 

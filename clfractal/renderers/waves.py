@@ -131,22 +131,36 @@ def most_turns(scene: Scene) -> int:
 # What work-items do of kernels that are not launched over pixels.
 OVER: dict[str, Over] = {
     "march_rays": "rays",
+    "march_points": "rays",
+    "step_rays": "rays",
     "march_inside": "rays",
     "walk_inside": "rays",
     "send_cones": "packets of rays",
     "look_at_surfaces": "packets of rays",
+    "look_where_steps_end": "packets of rays",
     "look_inside_set": "packets of rays",
     "look_where_walks_end": "packets of rays",
     "meet_objects": "packets of rays",
     "look_at_objects": "packets of rays",
 }
 # Packets look at surfaces where they march.
-OF_SINGLE_LANES = ("look_at_surfaces", "look_inside_set", "look_where_walks_end")
+OF_SINGLE_LANES = (
+    "look_at_surfaces",
+    "look_where_steps_end",
+    "look_inside_set",
+    "look_where_walks_end",
+)
 
 
-def march_kernels(plan: Plan) -> tuple[str, ...]:
-    """The kernels of `kernels/march.cl`: packets look at surfaces where they march."""
-    return ("march_rays", "look_at_surfaces") if plan.lanes == 1 else ("march_rays",)
+def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
+    """The kernels of `kernels/march.cl`, or of `march_steps.cl`: packets look at surfaces where they march."""
+    if scene.surface.search == "steps":
+        found = ("step_rays", "look_where_steps_end")
+    elif scene.surface.used_points.count > 1:
+        found = ("march_points", "look_at_surfaces")
+    else:
+        found = ("march_rays", "look_at_surfaces")
+    return found if plan.lanes == 1 else found[:1]
 
 
 def inside_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
@@ -161,14 +175,15 @@ def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterat
     cones = has_cones(scene, plan)
     if cones and samples[0] < samples[1]:
         yield Stage("send_cones", OVER["send_cones"], 1, of="blocks")
-        yield Stage("march_rays", OVER["march_rays"], 1, {"goal": GOAL_CONE}, of="blocks")
+        march = march_kernels(scene, plan)[0]
+        yield Stage(march, OVER[march], 1, {"goal": GOAL_CONE}, of="blocks")
     # A launch without samples only writes what pixels have.
     for sample in range(*samples):
         yield from _sample(scene, sample, plan, cones=cones)
 
 
 def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[Stage]:
-    marching = march_kernels(plan)
+    marching = march_kernels(scene, plan)
     points, after = scene.surface.used_points.count, light_turns(scene)
     steps = scene.surface.search == "steps"
 

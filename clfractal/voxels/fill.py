@@ -149,7 +149,7 @@ class _Filler:
         if not whole:
             recipes.append(programs.classify_recipe(source, sample, alone=alone))
         if renderer.normals != "gradient":
-            recipes.append(programs.normals_recipe(body, renderer, self.lanes, self.precision))
+            recipes.append(programs.normals_recipe(body, self.lanes, self.precision))
         built = programs.build_all(self.device, recipes, on_compile, self.token)
         kernels = {recipe.kernel: each for recipe, each in zip(recipes, built, strict=True)}
         start = time.perf_counter()
@@ -189,7 +189,9 @@ class _Filler:
         safe = 1.0 if self.scene.joined else min(body.chain.step_scale, 1.0)
         records: list[npt.NDArray[Any]] = [
             self.lattice.axes(precision, self.sub_points),
-            self.lattice.record(precision, self.sub_points, NODE_SAFETY * safe).reshape(1),
+            self.lattice.record(
+                precision, self.sub_points, NODE_SAFETY * safe, exact_normals=self.renderer.normals == "exact"
+            ).reshape(1),
             body.constants(precision),
         ]
         # Watched, because one launch of long orbits may take seconds.

@@ -31,6 +31,9 @@ LATTICE = Struct(
         Field("middle_offset", "real", 3, "from a voxel's first sub-point to its middle, scene units"),
         Field("side", "real", 0, "the least side of a voxel, scene units"),
         Field("step_scale", "real", 0, "part of a distance that is safe"),
+        Field(
+            "exact_normals", "int", 0, "1: normals are the formula's own; 0: of planes through the surface"
+        ),
     ],
 )
 
@@ -99,7 +102,7 @@ class Lattice:
         return np.concatenate(rows).astype(precision)
 
     def record(
-        self, precision: Precision, sub_points: int, step_scale: float
+        self, precision: Precision, sub_points: int, step_scale: float, *, exact_normals: bool = False
     ) -> np.ndarray[Any, np.dtype[np.void]]:
         """The struct of the kernels that evaluate voxels."""
         reach = 0.5 * (1 - 1 / sub_points)
@@ -111,6 +114,7 @@ class Lattice:
             "middle_offset": [reach * spacing for spacing in self.spacing],
             "side": min(self.spacing),
             "step_scale": step_scale,
+            "exact_normals": int(exact_normals),
         }
         return LATTICE.value(precision, values)
 

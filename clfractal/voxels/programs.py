@@ -208,16 +208,12 @@ def ranges_recipe() -> Recipe:
     return Recipe("voxels_blocks.cl", "brick_ranges", {}, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
-def normals_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Precision) -> Recipe:
+def normals_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
     """`refine_normals`: normals of samples at the surface by `least_squares` or `exact`."""
     return Recipe(
         "voxels_normals.cl",
         "refine_normals",
-        {
-            **_number_defines(lanes, precision),
-            **{f"NORMALS_{name.upper()}": number for number, name in enumerate(NORMALS)},
-            "NORMALS": NORMALS.index(renderer.normals),
-        },
+        _number_defines(lanes, precision),
         precision,
         body.texts(_turns),
         1,

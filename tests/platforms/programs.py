@@ -116,9 +116,7 @@ def of_grids(count: int, precision: Precision) -> Iterator[Named]:
     for value in programs.FILL_KINDS:
         renderer = VolumeRenderer.model_validate({"type": "volume", "value": value})
         recipes.append(programs.fill_recipe(body, renderer, count, precision))
-    for normals in programs.NORMALS[1:]:
-        renderer = VolumeRenderer.model_validate({"type": "volume", "normals": normals})
-        recipes.append(programs.normals_recipe(body, renderer, count, precision))
+    recipes.append(programs.normals_recipe(body, count, precision))
     if count == 1 and precision == "float32":  # these know neither packets nor the formula
         for alone in (False, True):
             recipes += [
@@ -144,14 +142,14 @@ def _joined_recipes(count: int, precision: Precision) -> Iterator[programs.Recip
         assert isinstance(scene.renderer, VolumeRenderer)
         body = Body.of(scene)
         yield programs.fill_recipe(body, scene.renderer, count, precision)
-        yield programs.normals_recipe(body, scene.renderer, count, precision)
+        yield programs.normals_recipe(body, count, precision)
         if name == "filled":
             yield programs.nodes_recipe(body, count, precision)
 
 
 def _choices(defines: Mapping[str, object]) -> str:
     """What a recipe's defines say beside the number type: `fill_kind=1 sample=float`."""
-    said = ("NORMALS", "FILL_KIND", "SOURCE", "SAMPLE", "VALUE", "RADIUS", "ALONE")
+    said = ("FILL_KIND", "SOURCE", "SAMPLE", "VALUE", "RADIUS", "ALONE")
     return " ".join(f"{name.lower()}={defines[name]}" for name in said if name in defines)
 
 

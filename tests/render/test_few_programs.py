@@ -100,7 +100,7 @@ JOINED: dict[str, dict[str, Any]] = {
     },
 }
 # Programs that know the formula, and whether anything is joined to it.
-OF_FORMULA = {"rays", "colors", "glow", "planes", "glass", "walks"}
+OF_FORMULA = {"rays", "point_rays", "steps", "colors", "glow", "planes", "glass", "walks"}
 
 
 def scene(formula: dict[str, Any] = FORMULA, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
@@ -236,7 +236,6 @@ def test_what_a_cut_plane_shows_is_data(device: Device) -> None:
 
 
 def test_normals_and_points_are_one_program(device: Device) -> None:
-    """But for the march, which polishes places that normals are made of."""
     kinds: list[dict[str, Any]] = [
         {"points": {"pattern": "grid", "count": 9}},
         {"points": {"pattern": "stochastic", "count": 4}},
@@ -246,9 +245,38 @@ def test_normals_and_points_are_one_program(device: Device) -> None:
         {"normal": "eight_triangles_normal"},
     ]
     found = [texts(scene(FORMULA, renderer=each), device) for each in kinds]
-    for each in found:
-        each.pop("rays")
     assert all(each == found[0] for each in found)
+
+
+MARCHES = {
+    "rays": {},
+    "point_rays": {"points": {"count": 4}},
+    "steps": {"search": "steps"},
+}
+
+
+@pytest.mark.parametrize("march", MARCHES)
+def test_marches_are_stages(march: str, device: Device) -> None:
+    """Rays, those of a pixel's points, and the search by steps have kernels of their own; what these are told is data."""
+    plain, points = (
+        texts(scene(FORMULA, renderer={**MARCHES[march], **more}), device)
+        for more in ({}, {"bounds": {"center": [1, 0, 0], "radius": 4}, "max_steps": 50})
+    )
+    assert points == plain
+    assert set(plain) & set(MARCHES) == {march}
+
+
+def test_points_march_by_the_text_of_rays(device: Device) -> None:
+    found = [texts(scene(FORMULA, renderer=MARCHES[each]), device)[each] for each in ("rays", "point_rays")]
+    assert found[0] == found[1]
+
+
+def test_points_of_the_search_by_steps_are_data(device: Device) -> None:
+    steps = {"search": "steps"}
+    found = [
+        texts(scene(FORMULA, renderer={**steps, **more}), device) for more in ({}, {"points": {"count": 4}})
+    ]
+    assert found[0]["steps"] == found[1]["steps"]
 
 
 POWERS = [1.5, *(2 + 0.5 * step for step in range(45)), 2.71, 8.001, 31.5, 32]
@@ -303,7 +331,7 @@ ASKING: dict[str, Any] = {
 def test_joins_are_data(joined: str, device: Device) -> None:
     known, other = (texts(scene(FORMULA, objects=JOINED[each], **ASKING), device) for each in ("cut", joined))
     assert other == known
-    assert set(known) >= OF_FORMULA - {"glass", "walks"}
+    assert set(known) >= OF_FORMULA - {"point_rays", "steps", "glass", "walks"}
 
 
 @pytest.mark.parametrize("join", ["union", "cut", "smooth_union", "intersection"])
@@ -329,17 +357,18 @@ ALIKE = re.compile(
 )
 
 
-def test_nothing_else_is_defined_for_stages_without_a_formula(device: Device) -> None:
-    """A define that stands for a feature is a conditional by another name."""
+def test_nothing_else_is_defined(device: Device) -> None:
+    """A define that stands for a feature is a conditional by another name. (The formula's own are in its text.)"""
     scenes = [
         scene(FORMULA, **FEATURES["objects"][0]),
         scene(FORMULA, lighting={"mode": "path"}),
         scene(FORMULA, renderer={"normal": "least_squares"}),
+        scene(FORMULA, renderer={"search": "steps"}, **ASKING),
+        scene(FORMULA, material={"name": "m"}, materials={"m": GLASS}, **PATHS),
+        scene(FORMULA, material={"name": "m"}, materials={"m": MILK}, **PATHS),
     ]
     for each_scene in scenes:
-        for name, text in texts(each_scene, device).items():
-            if name in OF_FORMULA:
-                continue
+        for text in texts(each_scene, device).values():
             head = text.split("#line", 1)[0]
             named = set(re.findall(r"^#define (\w+)", head, re.MULTILINE)) - {"LANES", "REAL_IS_DOUBLE"}
             assert {each for each in named if not ALIKE.fullmatch(each)} <= LEFT
