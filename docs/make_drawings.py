@@ -332,7 +332,6 @@ _BESIDE = {
         "look_at_surfaces",
         "march_points",
         "step_rays",
-        "look_where_steps_end",
     ),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }

@@ -6,28 +6,10 @@
 #include "passed.h"
 #include "proof.h"
 #include "march.h"
-#include "queue.h"
-#include "share.h"
-#include "arguments.h"
-#include "surface_at.h"
+#include "marches.h"
 
-// Marches all rays of a queue, each work-item its share.
 STAGE(march_rays) {
     const queue q = MARCH_QUEUE(0);
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next < mine.end && !WAS_CANCELLED) march_and_look(mine, q, goal, STATISTICS_HERE + STATISTIC_WAITS, settings, orbit, k);
 }
-
-// The same where pixels have points. What their rays know already is one number more in a march, and takes a twentieth more time.
-STAGE(march_points) {
-    const queue q = MARCH_QUEUE(1);
-    const share mine = share_of_item(ITEM, slice, q);
-    if (mine.next < mine.end && !WAS_CANCELLED) march_and_look(mine, q, goal, STATISTICS_HERE + STATISTIC_WAITS, settings, orbit, k);
-}
-
-#if LANES == 1
-STAGE(look_at_surfaces) {
-    const queue q = MARCH_QUEUE(settings->point_count > 1);
-    if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k);
-}
-#endif

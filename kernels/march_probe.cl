@@ -1,12 +1,6 @@
 // Marches rays that the host has made, and looks at the surfaces that they meet, to measure how fast a device does that with packets
 // of LANES rays. Nothing is shaded, so it compiles in a fraction of a renderer's time; a picture's time is mostly that of the same.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "formula.h"
-#include "solids.h"
+#include "orbits.h"
 #include "rays.h"
 #include "march_state.h"
 #include "passed.h"

@@ -162,12 +162,3 @@ INLINE void look_at_share(share mine, queue q, int goal, __constant const struct
     if (LANES == 1 || (goal != GOAL_SURFACE && goal != GOAL_POINT)) return;
     for (int at = mine.next; at < mine.end; at += LANES) look_at(q, at, settings, orbit, k);
 }
-
-// Marches a share, and looks at the surfaces that it meets; `waiting` counts the steps that lanes have waited.
-INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting, __constant const struct March *settings,
-                           __constant const struct Orbit *orbit, __constant const scalar *k) {
-    const int waits = march_share(mine, q, goal, settings, orbit, k);
-    look_at_share(mine, q, goal, settings, orbit, k);
-    // Nobody counts those of the cones.
-    if (LANES > 1 && goal != GOAL_CONE) atomic_add(waiting, (uint)waits);
-}

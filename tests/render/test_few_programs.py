@@ -266,11 +266,6 @@ def test_marches_are_stages(march: str, device: Device) -> None:
     assert set(plain) & set(MARCHES) == {march}
 
 
-def test_points_march_by_the_text_of_rays(device: Device) -> None:
-    found = [texts(scene(FORMULA, renderer=MARCHES[each]), device)[each] for each in ("rays", "point_rays")]
-    assert found[0] == found[1]
-
-
 def test_points_of_the_search_by_steps_are_data(device: Device) -> None:
     steps = {"search": "steps"}
     found = [
