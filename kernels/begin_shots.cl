@@ -12,9 +12,7 @@ STAGE(send_cones) {
 
 // Sends the rays from the eye. With several points to the pixel the ray only finds out how far the pixel's whole cone is free.
 STAGE(begin_shots) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));

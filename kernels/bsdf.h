@@ -110,11 +110,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
         const real inner = R(1.0) - (R(1.0) - albedo_of_dielectric(tables, R(1.0), b.coat_rough, b.coat_root).mean) / (b.coat_ior * b.coat_ior);
         const real most = b.coat * p->coat_darkening;
 #define DARKENING(c) (R(1.0) - most + most * (R(1.0) - inner) / (R(1.0) - inner * (c)))
-#define DARKENED(c) c *= DARKENING(c)
-        DARKENED(b.body.r);
-        DARKENED(b.body.g);
-        DARKENED(b.body.b);
-#undef DARKENED
+        b.body = color_of(b.body.r * DARKENING(b.body.r), b.body.g * DARKENING(b.body.g), b.body.b * DARKENING(b.body.b));
         b.below = color_of(DARKENING(p->subsurface_color.r), DARKENING(p->subsurface_color.g), DARKENING(p->subsurface_color.b));
         b.metal = b.body;
         b.coat_albedo = b.coat * albedo_of_dielectric(tables, b.out.z, b.coat_rough, b.coat_root).of_direction;
@@ -145,9 +141,7 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several,
         const real repeats = twice + more * between * (R(1.0) - onward) / (R(1.0) - onward * between);                      \
         sum.c = single * fresnel_metal(meeting, b->metal.c, b->edge.c) + ends * repeats;                                    \
     }
-    METAL_PART(r)
-    METAL_PART(g)
-    METAL_PART(b)
+    METAL_PART(r) METAL_PART(g) METAL_PART(b)
 #undef METAL_PART
     return sum;
 }

@@ -35,18 +35,10 @@ INLINE albedo glass_albedo(__global const float *tables, real cosine, const glas
 // `cosine`: of the viewer's direction with the normal on its side.
 INLINE glass glass_at(real weight, real cosine, real inside, real ior, real bending, real rough, real alpha, real root, color tint,
                       __global const float *tables) {
-    glass g;
     const real index = fmax(bending, GLASS_LEAST), mean = fmax(ior, GLASS_LEAST);
-    g.weight = weight;
-    g.inside = less(R(0.5), inside);
-    g.across = pick(g.inside, R(1.0) / index, index);
-    g.mirrors = pick(g.inside, R(1.0) / mean, mean);
-    g.alpha = alpha;
-    g.rough = rough;
-    g.root = root;
-    g.tint = tint;
-    g.lost = g.crosses = R(0.0);
-    g.mean_lost = g.mean_beyond = R(1.0);
+    const mask within = less(R(0.5), inside);
+    glass g = {.weight = weight, .across = pick(within, R(1.0) / index, index), .mirrors = pick(within, R(1.0) / mean, mean),
+               .alpha = alpha, .rough = rough, .root = root, .inside = within, .tint = tint, .mean_lost = R(1.0), .mean_beyond = R(1.0)};
     if (!any_lane(less(R(0.0), weight))) return g;
     const albedo here = glass_albedo(tables, cosine, &g, 0), beyond = glass_albedo(tables, cosine, &g, 1);
     g.lost = R(1.0) - here.of_direction;

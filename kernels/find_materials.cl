@@ -12,10 +12,8 @@
 
 // Keeps the numbers of a path's present spot, and the slope of its relief.
 STAGE(find_materials) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
+    STAGE_BEGINS(s, w);
     if (paths_are_over(s)) return;
-    const world w = WORLD;
     spot here = spot_kept(s, bounce);
     if (!any_lane(mask_of(here.found))) return;
     const aim a = aim_kept(s);

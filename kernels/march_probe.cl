@@ -11,8 +11,8 @@
 #include "surface_at.h"
 
 // `rays` and `met`: a queue of `wave` rays, with `stride` from one number of a ray to its next; each work-item marches a share.
-__kernel void march_probe(__global scalar *rays, __global scalar *met, __constant const struct March *settings,
-                          __constant const struct Orbit *orbit, __constant const scalar *k, int wave, int stride, int slice, int goal) {
+__kernel void march_probe(__global scalar *rays, __global scalar *met, march_record settings,
+                          orbit_record orbit, constants k, int wave, int stride, int slice, int goal) {
     const queue q = {rays, met, wave, 1, stride, ENCOUNTER_SOLID, 0, 0};
     const share mine = share_of_item((int)get_global_id(0), slice, q);
     if (mine.next >= mine.end) return;

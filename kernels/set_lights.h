@@ -20,10 +20,9 @@ INLINE set_ball set_ball_of(real number, world w) {
     for (int lane = 0; lane < LANES; ++lane) {
         for (int i = 0; i < SET_BALL; ++i) found[i][lane] = w.set_lights[(int)which[lane] * SET_BALL + i];
     }
-    set_ball b = {vec_of(lanes_load(found[0]), lanes_load(found[1]), lanes_load(found[2])), lanes_load(found[3]),
+    return (set_ball){vec_of(lanes_load(found[0]), lanes_load(found[1]), lanes_load(found[2])), lanes_load(found[3]),
                   color_of(lanes_load(found[4]), lanes_load(found[5]), lanes_load(found[6])),
                   less_equal((real)((scalar)SET_SHADOW), lanes_load(found[7]))};
-    return b;
 }
 
 // The probabilities of the cell in which a place lies, as the number where they begin; those outside have the nearest cell's.
