@@ -21,7 +21,7 @@ STAGE(send_air) {
         const scattering from = scattered(s, &here.at, r, far, i, w);
         const ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
                           (r.footprint + r.spread * from.t) * (real)(w.settings->shadow_detail), R(0.0), RAY_NOTHING_KNOWN};
-        const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? less(R(0.0), R(1.0)) : less(R(1.0), R(0.0)));
+        const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? ~0 : 0);
         send_clipped(s, next_turns + i, asks, R(0.0), WHETHER, wanted, w);
     }
 }

@@ -38,7 +38,8 @@ INLINE glass glass_at(real weight, real cosine, real inside, real ior, real bend
     const real index = fmax(bending, GLASS_LEAST), mean = fmax(ior, GLASS_LEAST);
     const mask within = less(R(0.5), inside);
     glass g = {.weight = weight, .across = pick(within, R(1.0) / index, index), .mirrors = pick(within, R(1.0) / mean, mean),
-               .alpha = alpha, .rough = rough, .root = root, .inside = within, .tint = tint, .mean_lost = R(1.0), .mean_beyond = R(1.0)};
+               .alpha = alpha, .rough = rough, .root = root, .inside = within, .tint = tint,
+               .mean_lost = R(1.0), .mean_beyond = R(1.0)};
     if (!any_lane(less(R(0.0), weight))) return g;
     const albedo here = glass_albedo(tables, cosine, &g, 0), beyond = glass_albedo(tables, cosine, &g, 1);
     g.lost = R(1.0) - here.of_direction;

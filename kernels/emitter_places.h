@@ -2,8 +2,8 @@
 // units, of a box a place of the faces that are seen by solid angle, of a cylinder one of a lid by area, or of the side by the angle along
 // its axis. Nobody asks for an object from inside it.
 //
-// A shape that can shine has a function emitter_place NAME_place(vec sides, vec point, real choice, real u, real v, const vec *met), which
-// chooses a place of it that a turned point outside of it sees; or gives the density of that which is `met`.
+// A shape that can shine has a function which chooses a place of it that a turned point outside of it sees, or gives the density of that
+// which is `met`: emitter_place NAME_place(vec sides, vec point, real choice, real u, real v, const vec *met).
 #define SHINING(DO) DO(SPHERE, ball) DO(BOX, box) DO(CYLINDER, cylinder)
 
 // "Turned" are places from the middle of an object along its axes, in scene units.
@@ -87,7 +87,8 @@ INLINE emitter_place box_place(vec sides, vec point, real choice, real u, real v
     const box_face f = box_face_of(from, turn_over(first, second, sides));
     vec place = rectangle_place(&f.seen, u, v);
     place.z = copysign(place.z, -from.z);
-    const vec way = met ? vec_sub(*met, point) : turn_back(first, second, place), toward = turn_over(first, second, vec_normalize(way));
+    const vec way = met ? vec_sub(*met, point) : turn_back(first, second, place);
+    const vec toward = turn_over(first, second, vec_normalize(way));
     return (emitter_place){way, f.share / fmax(all, (real)(REAL_SMALLEST)) * rectangle_place_density(&f.seen, f.area, fabs(toward.z))};
 }
 

@@ -47,7 +47,8 @@ CALLED color environment_color(vec direction, material_record m, __global const 
         __global const float *upper = pixels + 3 * width * row;
         __global const float *lower = row + 1 < height ? upper + 3 * width : upper;
         for (int i = 0; i < 3; ++i, ++upper, ++lower) {
-            mixed[i][lane] = mix(mix(upper[3 * first], upper[3 * second], right), mix(lower[3 * first], lower[3 * second], right), low);
+            const float above = mix(upper[3 * first], upper[3 * second], right), under = mix(lower[3 * first], lower[3 * second], right);
+            mixed[i][lane] = mix(above, under, low);
         }
     }
     const real intensity = (real)(m->environment_intensity);

@@ -1,5 +1,5 @@
-// Shapes in units of their own, into which places and rays are brought: a ball, cube or cylinder of radius 1, or all below z = 0; distances
-// along a ray stay the same there. A kind is a file with these functions, and its name in the table:
+// Shapes in units of their own, into which places and rays are brought: a ball, cube or cylinder of radius 1, or all below z = 0;
+// distances along a ray stay the same there. A kind is a file with these functions, and its name in the table:
 //   span NAME_span(vec from, vec way)           the part of a ray's line within
 //   vec NAME_normal(vec own)                    at a place of the surface, away from the inside; of any length
 //   vec NAME_on(vec own)                        that place without the rounding of the way there
@@ -50,4 +50,4 @@ INLINE vec shape_on(int kind, vec own) { switch (kind) { SHAPES(ON) default: ret
 #define HOLDS(KIND, name) case SHAPE_##KIND: return name##_holds(own);
 INLINE mask shape_holds(int kind, vec own) { switch (kind) { SHAPES(HOLDS) default: return less(R(1.0), R(0.0)); } }
 #define FAR_FROM(KIND, name) case SHAPE_##KIND: return name##_far(own, sides, n);
-INLINE real shape_far(int kind, vec own, vec sides, vec *n) { switch (kind) { SHAPES(FAR_FROM) default: return (real)(REAL_LARGEST); } }
+INLINE real shape_far(int kind, vec own, vec sides, vec *n) { switch (kind) { SHAPES(FAR_FROM) default: return own.z; } }

@@ -8,9 +8,10 @@ INLINE vec vec_of(real x, real y, real z) { return (vec){x, y, z}; }
 #define vec_splat(a) vec_of((real)((a)[0]), (real)((a)[1]), (real)((a)[2]))
 #define vec_of_counts(a) vec_of((real)((scalar)(a)[0]), (real)((scalar)(a)[1]), (real)((scalar)(a)[2]))
 // A vector by the three axes of a record, and from its numbers along these.
-#define vec_along_axes(o, a) vec_of(vec_dot(a, vec_splat((o)->own_x)), vec_dot(a, vec_splat((o)->own_y)), vec_dot(a, vec_splat((o)->own_z)))
+#define own_axis(o, i) vec_splat((o)->own_##i)
+#define vec_along_axes(o, a) vec_of(vec_dot(a, own_axis(o, x)), vec_dot(a, own_axis(o, y)), vec_dot(a, own_axis(o, z)))
 #define vec_of_axes(o, a) \
-    vec_add(vec_add(vec_scale(vec_splat((o)->own_x), (a).x), vec_scale(vec_splat((o)->own_y), (a).y)), vec_scale(vec_splat((o)->own_z), (a).z))
+    vec_add(vec_add(vec_scale(own_axis(o, x), (a).x), vec_scale(own_axis(o, y), (a).y)), vec_scale(own_axis(o, z), (a).z))
 INLINE vec vec_add(vec a, vec b) { return vec_of(a.x + b.x, a.y + b.y, a.z + b.z); }
 INLINE vec vec_sub(vec a, vec b) { return vec_of(a.x - b.x, a.y - b.y, a.z - b.z); }
 INLINE vec vec_mul(vec a, vec b) { return vec_of(a.x * b.x, a.y * b.y, a.z * b.z); }

@@ -13,8 +13,8 @@ INLINE void middle_of(__global const scalar *along, int cells, int node, int las
     *half_side = S(0.5) * (along[high] - along[low]);
 }
 
-// 0: undecided, 1: empty, 2: full. A node is empty if the ball around its middle that the distance proves to be outside holds all its points. `nodes` are
-// places of nodes of `cells` voxels a side; for octants they are those of bricks, each of which stands for its eight.
+// 0: undecided, 1: empty, 2: full. A node is empty if the ball around its middle that the distance proves to be outside holds all its
+// points. `nodes` are places of nodes of `cells` voxels a side; for octants those of bricks, each of which stands for its eight.
 __kernel void classify_nodes(__global uchar *classes, __global const ulong *nodes, int first, int count,
                           int cells, __global const scalar *axes, __constant const struct Lattice *lattice,
                           orbit_record orbit, constants k) {

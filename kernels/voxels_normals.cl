@@ -162,7 +162,8 @@ __kernel void refine_normals(__global uint *normals, __global const ulong *brick
             for (int lane = 0; lane < LANES; ++lane) {
                 // The last lanes repeat the last sample.
                 const int sample = list[min(p * LANES + lane, wanted - 1)];
-                const int voxel[3] = {BRICK * PLACE_X(place) + sample % BRICK_SIDE, BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE,
+                const int voxel[3] = {BRICK * PLACE_X(place) + sample % BRICK_SIDE,
+                                      BRICK * PLACE_Y(place) + sample / BRICK_SIDE % BRICK_SIDE,
                                       BRICK * PLACE_Z(place) + sample / (BRICK_SIDE * BRICK_SIDE)};
                 __global const scalar *along = axes;
                 for (int axis = 0; axis < 3; ++axis) {
