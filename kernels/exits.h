@@ -3,16 +3,13 @@
 #define EXIT_GRAZES R(0.05)   // least cosine of a ray with the normal where it leaves the set
 
 // The rays within: each pixel's second one. `objects`: whether they meet any.
-INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, __constant const struct March *settings,
-                       int objects) {
-    const queue q = {rays + wave, met + wave, wave, 1, stride, settings->met_numbers, objects, 0};
-    return q;
+INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, int stride, march_record settings, int objects) {
+    return (queue){rays + wave, met + wave, wave, 1, stride, settings->met_numbers, objects, 0};
 }
 
 // Looks at the surfaces where rays of a queue from number `at` on leave the set. It is the surface that a ray meets which comes
 // the other way; its normal is told on the side of the inside.
-INLINE void look_inside(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE void look_inside(queue q, int at, march_record settings, orbit_record orbit, constants k) {
     encounter e = queue_met(q, 0, at);
     mask hit = mask_of(e.hit);
     hit &= ~less(R(0.0), queue_object(q, 0, at, e));
@@ -40,8 +37,8 @@ INLINE void look_inside(queue q, int at, __constant const struct March *settings
 }
 
 // The same for a packet's share, which has been marched; `waits` are counted in the launch's statistics.
-INLINE void look_along_share(share mine, int waits, queue q, __global uint *statistics, __constant const struct March *settings,
-                             __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void look_along_share(share mine, int waits, queue q, __global uint *statistics, march_record settings,
+                             orbit_record orbit, constants k) {
     if (LANES == 1) return;
     for (int at = mine.next; at < mine.end; at += LANES) look_inside(q, at, settings, orbit, k);
     atomic_add(statistics + STATISTIC_WAITS, (uint)waits);

@@ -47,12 +47,12 @@ INLINE sight march_place(const march *m) {
 }
 
 // The scaled distance at which light is computed, in cones.
-INLINE real near_of(clearance here, __constant const struct March *settings) {
+INLINE real near_of(clearance here, march_record settings) {
     return JOINED ? (real)(settings->near) * here.scale / (real)(settings->step_scale) : (real)(settings->near);
 }
 
 // The step in a hollow: nothing counts as near there, but for what is joined to it.
-INLINE void march_blind(const march *m, sight *s, __constant const struct March *settings) {
+INLINE void march_blind(const march *m, sight *s, march_record settings) {
     const real step = (real)(settings->step), first = fmax(BLIND_FIRST * s->cone, BLIND_LEAST * step);
     const real pace = fmin(fmax(BLIND_GROWTH * m->step_before, first), step);
     const real most = s->here.most * step_scale_of(s->here, settings->step_scale), free = fmin(fmax(fmax(pace, s->cone), s->radius), most);
@@ -64,7 +64,7 @@ INLINE void march_blind(const march *m, sight *s, __constant const struct March 
 
 // Estimates are made for the inside of the formula's ball. Farther out they may be too large: there no step leads into it. How far the
 // ball is along the ray, and in `around` in any direction; beyond all where the ray does not meet it, or none goes so far.
-INLINE real march_to_ball(const march *m, const sight *s, real *around, __constant const struct March *settings) {
+INLINE real march_to_ball(const march *m, const sight *s, real *around, march_record settings) {
     *around = (real)(REAL_LARGEST);
     if (!settings->goes_far) return *around;
     const vec arm = vec_sub(s->on_ray, vec_splat(settings->ball_center));
@@ -77,7 +77,7 @@ INLINE real march_to_ball(const march *m, const sight *s, real *around, __consta
 }
 
 // What the distance found at that place means for the march.
-INLINE void march_measure(march *m, sight *s, int goal, __constant const struct March *settings) {
+INLINE void march_measure(march *m, sight *s, int goal, march_record settings) {
     const mask free = less_equal((real)(REAL_LARGEST), m->high) & ~proof_under_way(m);
     s->to_ball = march_to_ball(m, s, &s->around, settings);
     s->cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
@@ -101,7 +101,7 @@ INLINE void march_measure(march *m, sight *s, int goal, __constant const struct 
 }
 
 // Keeps where the cone has come near the solid: between two steps, so that it does not depend on how long they were.
-INLINE void march_keep(march *m, const sight *s, mask outside, mask passed, mask inside, __constant const struct March *settings) {
+INLINE void march_keep(march *m, const sight *s, mask outside, mask passed, mask inside, march_record settings) {
     const real height = s->cone * near_of(s->here, settings);
     const mask beside = outside & less(s->near, height) & ~s->blind;
     const mask first = outside & (~beside | less_equal((real)(REAL_LARGEST), m->found.touch));
@@ -114,7 +114,7 @@ INLINE void march_keep(march *m, const sight *s, mask outside, mask passed, mask
 
 // The next place of the lanes that march, which went `overshot` or not and have `slope` now.
 INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot, mask early, mask passed, real slope, int goal,
-                         __constant const struct March *settings) {
+                         march_record settings) {
     // Where the distance falls like that of a plane, the next sphere touches this one at 2 / (1 - slope) radii (Ban and
     // Valasek 2023, Automatic step size relaxation in sphere tracing).
     const mask landing = marching & ~overshot & ~at_ball(s) & less(s->radius, goal == GOAL_SURFACE ? LANDING * s->cone : R(0.0));
@@ -146,7 +146,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 
 // One step of cones: as far as the free sphere holds the cone's whole width. The lanes that go on remain active. A cone that
 // leaves its ray's part ends beyond everything.
-INLINE void march_cone(march *m, const sight *s, __constant const struct March *settings) {
+INLINE void march_cone(march *m, const sight *s, march_record settings) {
     const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
     const real free = (real)(settings->cone_share) * fmin(s->radius, s->around), square = free * free - s->cone * s->cone;
     const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
@@ -162,7 +162,7 @@ INLINE void march_cone(march *m, const sight *s, __constant const struct March *
 
 // A pixel's point begins near where the pixel's cone touched the set. What is inside there steps back, farther each time, but not
 // out of the bounds: the lanes that do.
-INLINE mask march_too_early(march *m, mask inside, real cone, __constant const struct March *settings) {
+INLINE mask march_too_early(march *m, mask inside, real cone, march_record settings) {
     const mask early = is_point(m) & inside & less_equal((real)(REAL_LARGEST), m->radius_before) & less(m->found.steps, BACK_STEPS);
     if (any_lane(early)) {
         ray whole = m->r;
@@ -174,7 +174,7 @@ INLINE mask march_too_early(march *m, mask inside, real cone, __constant const s
 }
 
 // What the active lanes do after a look; those that arrive, or leave their ray's part, are active no longer.
-INLINE void march_act(march *m, sight s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+INLINE void march_act(march *m, sight s, int goal, march_record settings, orbit_record orbit) {
     march_measure(m, &s, goal, settings);
     if (goal == GOAL_CONE) {
         march_cone(m, &s, settings);
@@ -234,8 +234,7 @@ INLINE void march_act(march *m, sight s, int goal, __constant const struct March
 }
 
 // One step of the active lanes.
-INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                       __constant const scalar *k) {
+INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     sight s = march_place(m);
     if (HAS_DERIVATIVE) s.here = orbit_step(s.point, m->active, orbit, k);
     else s.here = orbit_dual_distance(s.point, m->active, OF_DISTANCE, orbit, k, &s.surface);
@@ -244,8 +243,7 @@ INLINE void march_step(march *m, int goal, __constant const struct March *settin
 
 // One step of two packets. Their orbits run side by side: an application is a chain of operations that wait for each other, and the
 // processor works on the other packet's meanwhile.
-INLINE void march_step_both(march *m, march *n, int goal, __constant const struct March *settings,
-                            __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void march_step_both(march *m, march *n, int goal, march_record settings, orbit_record orbit, constants k) {
     sight s = march_place(m), other = march_place(n);
     const vec points[2] = {s.point, other.point};
     const mask active[2] = {m->active, n->active};

@@ -24,7 +24,7 @@ typedef struct {
 } march;
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
-INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     const real ahead = goal == GOAL_WALK ? R(0.0) : ENTRANCE_START * (real)(settings->detail) * r.footprint;
     const real start = r.near + ahead;
     m->r = ray_pick(fresh, r, m->r);
@@ -78,8 +78,7 @@ INLINE real march_goes_to(const march *m, real onward) {
 }
 
 // One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
-INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                       __constant const scalar *k) {
+INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
     const vec point = vec_along(m->r.origin, m->t, m->r.direction);
     const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);

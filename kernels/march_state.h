@@ -49,7 +49,7 @@ INLINE mask is_point(const march *m) { return less(m->r.known, RAY_NOTHING_KNOWN
 INLINE mask at_ball(const sight *s) { return less(s->radius, s->near); }
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
-INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     m->r = ray_pick(fresh, r, m->r);
     m->active |= fresh;
     m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
@@ -74,4 +74,3 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
     m->retry_t = pick(fresh, R(0.0), m->retry_t);
     m->retry_radius = pick(fresh, R(0.0), m->retry_radius);
 }
-

@@ -26,7 +26,7 @@ typedef struct {
 } march;
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
-INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const struct March *settings) {
+INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     const real step = (real)(settings->step);
     const real start = goal == GOAL_POINT ? clamp(r.known, r.near, r.far) : r.near;
     m->r = ray_pick(fresh, r, m->r);
@@ -41,8 +41,7 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, __constant const 
 }
 
 // One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
-INLINE void march_step(march *m, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                       __constant const scalar *k) {
+INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     const real step = (real)(settings->step);
     const int narrows = goal == GOAL_SURFACE || goal == GOAL_POINT;
     const vec point = vec_along(m->r.origin, m->t, m->r.direction);

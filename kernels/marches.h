@@ -5,8 +5,8 @@
 #include "surface_at.h"
 
 // Marches a share, and looks at the surfaces that it meets; `waiting` counts the steps that lanes have waited.
-INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting, __constant const struct March *settings,
-                           __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting, march_record settings,
+                           orbit_record orbit, constants k) {
     const int waits = march_share(mine, q, goal, settings, orbit, k);
     look_at_share(mine, q, goal, settings, orbit, k);
     // Nobody counts those of the cones.

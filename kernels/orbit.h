@@ -17,7 +17,7 @@
 // Sandin, Kauffman 1989; the half makes it a lower bound for conformal maps). The solid of `iterations` applications is the
 // level set of G at L = log(bailout) / degree^iterations. The map of a half plane that bends space most, w -> w^2, has the
 // distance (G^2 - L^2) / (2 G |grad G|). Far outside the distance is at most (1 - exp(-G)) / |grad G|, that of a ball.
-INLINE real distance_from_growth(real square, real relative, real count, __constant const struct Orbit *orbit) {
+INLINE real distance_from_growth(real square, real relative, real count, orbit_record orbit) {
     real distance;
     if (LOGARITHMIC) {
         const real height = R(0.34657359028) * quick_log2(square);  // half of log 2
@@ -34,13 +34,11 @@ INLINE real distance_from_growth(real square, real relative, real count, __const
 }
 
 // Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
-INLINE mask settled(real square, __constant const struct Orbit *orbit) {
-    return less_equal(square, (real)(orbit->bailout_square));
-}
+INLINE mask settled(real square, orbit_record orbit) { return less_equal(square, (real)(orbit->bailout_square)); }
 
 // What an orbit for a distance looks at after `look` applications: at the limit, which of its lanes are inside; before it, whether
 // the work was cancelled, which is the result.
-INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, __constant const struct Orbit *orbit) {
+INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, orbit_record orbit) {
     if (n < orbit->iterations) {
         *look = min(n + ORBIT_LOOK, orbit->iterations);
         return orbit_cancelled(orbit);
@@ -52,7 +50,7 @@ INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, 
 }
 
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
-INLINE orbit_counted formula_escape_count(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_counted formula_escape_count(vec point, mask active, orbit_record orbit, constants k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -70,8 +68,7 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, __constant con
         count -= alive;  // true is -1
         alive &= less_equal(square, (real)(orbit->bailout_square));
     }
-    const orbit_counted result = {count, alive};
-    return result;
+    return (orbit_counted){count, alive};
 }
 
 // Orbits are written for the `usual` values of a formula's exponents and conditions, which are literals then, and for any: a branch
@@ -79,8 +76,7 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, __constant con
 
 // Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
 // solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
-INLINE orbit_end end_by(int usual, vec point, mask active, int limit, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_record orbit, constants k) {
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
@@ -99,16 +95,15 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, __constant
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
     alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & settled(square, orbit);
-    const orbit_end result = {count, alive};
-    return result;
+    return (orbit_end){count, alive};
 }
 
-INLINE orbit_end formula_end(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE orbit_end formula_end(vec point, mask active, int limit, orbit_record orbit, constants k) {
     if (has_usual_values(k)) return end_by(1, point, active, limit, orbit, k);
     return end_by(0, point, active, limit, orbit, k);
 }
 
-INLINE mask formula_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE mask formula_inside(vec point, mask active, int limit, orbit_record orbit, constants k) {
     return formula_end(point, active, limit, orbit, k).inside;
 }
 
@@ -117,8 +112,8 @@ INLINE mask formula_inside(vec point, mask active, int limit, __constant const s
 // The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
 // a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
 // sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`.
-INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, __constant const struct Orbit *orbit,
-                                  __constant const scalar *k, surface_point *surface) {
+INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, orbit_record orbit,
+                                  constants k, surface_point *surface) {
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
@@ -162,16 +157,14 @@ INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, __c
     surface->square = square;
     surface->square_before = square_before;
     const real step = pick(inside, R(0.0), distance);
-    const clearance result = {step, {count, inside}, step};
-    return result;
+    return (clearance){step, {count, inside}, step};
 }
 
 CALLED void other_dual_distance(const vec *point, const mask *active, int of, clearance *found, surface_point *surface,
-                                __constant const struct Orbit *orbit, __constant const scalar *k) {
+                                orbit_record orbit, constants k) {
     *found = dual_distance_by(0, *point, *active, of, orbit, k, surface);
 }
-INLINE clearance formula_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
-                                       __constant const scalar *k, surface_point *surface) {
+INLINE clearance formula_dual_distance(vec point, mask active, int of, orbit_record orbit, constants k, surface_point *surface) {
     if (has_usual_values(k)) return dual_distance_by(1, point, active, of, orbit, k, surface);
     clearance found;
     other_dual_distance(&point, &active, of, &found, surface, orbit, k);
@@ -180,7 +173,7 @@ INLINE clearance formula_dual_distance(vec point, mask active, int of, __constan
 
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
 // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
-INLINE real formula_smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real formula_smooth_count(orbit_end end, surface_point surface, orbit_record orbit) {
     const real log_radius = (real)(orbit->log_distance_bailout);
     real over;
     if (LOGARITHMIC) over = log2(R(0.5) * log(fmax(surface.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
@@ -190,7 +183,7 @@ INLINE real formula_smooth_count(orbit_end end, surface_point surface, __constan
 }
 
 // The potential G = log|z_n| / degree^n, which falls towards the solid. Linear maps have none: 0, as near as can be.
-INLINE real formula_potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real formula_potential(orbit_end end, surface_point surface, orbit_record orbit) {
     if (!LOGARITHMIC) return R(0.0);
     return R(0.34657359028) * quick_log2(surface.square) * exp2(-end.count * (real)(orbit->log2_degree));
 }
@@ -204,8 +197,7 @@ typedef struct {
     mask alive, inside;
 } scalar_orbit;
 
-INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __constant const struct Orbit *orbit,
-                               __constant const scalar *k) {
+INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, orbit_record orbit, constants k) {
     start(point, k, &o->c, &o->z);
     o->growth = R(1.0);
     o->square = state_square(o->z);
@@ -214,7 +206,7 @@ INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, __consta
     o->inside = o->alive & ~o->alive;
 }
 
-INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, orbit_record orbit, constants k) {
     real next_growth = o->growth;
     const state next = apply_derivative_by(usual, n, o->z, o->c, &next_growth, k);
     o->z = state_pick(o->alive, next, o->z);
@@ -225,7 +217,7 @@ INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, __constant con
 }
 
 // The distance by this derivative: |z| / g with g carried as one number.
-INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, orbit_record orbit, constants k) {
     mask inside = o->inside;
     if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
     real distance;
@@ -237,12 +229,10 @@ INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, __constant
         distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
     }
     const real step = pick(inside, R(0.0), distance);
-    const clearance result = {step, {o->count, inside}, step};
-    return result;
+    return (clearance){step, {o->count, inside}, step};
 }
 
-INLINE clearance scalar_distance_by(int usual, vec point, mask active, __constant const struct Orbit *orbit,
-                                    __constant const scalar *k) {
+INLINE clearance scalar_distance_by(int usual, vec point, mask active, orbit_record orbit, constants k) {
     scalar_orbit o;
     scalar_orbit_begin(&o, point, active, orbit, k);
     for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
@@ -253,7 +243,7 @@ INLINE clearance scalar_distance_by(int usual, vec point, mask active, __constan
     return scalar_orbit_end(&o, active, orbit, k);
 }
 
-INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {
     if (has_usual_values(k)) return scalar_distance_by(1, point, active, orbit, k);
     return scalar_distance_by(0, point, active, orbit, k);
 }
@@ -261,7 +251,7 @@ INLINE clearance formula_distance(vec point, mask active, __constant const struc
 // The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
 // on the other packet's meanwhile.
 INLINE void scalar_distances_by(int usual, const vec *points, const mask *active, clearance *found,
-                                __constant const struct Orbit *orbit, __constant const scalar *k) {
+                                orbit_record orbit, constants k) {
     scalar_orbit a, b;
     scalar_orbit_begin(&a, points[0], active[0], orbit, k);
     scalar_orbit_begin(&b, points[1], active[1], orbit, k);
@@ -288,7 +278,7 @@ INLINE void formula_distances(const vec *points, const mask *active, clearance *
     else other_scalar_distances(points, active, found, orbit, k);
 }
 #else
-INLINE clearance formula_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {
     surface_point ignored;
     return formula_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
 }

@@ -13,7 +13,6 @@ INLINE mask seeks_sheets(const march *m, int goal) {
 
 // Lanes that look between `low` and `behind`.
 INLINE mask passed_between(const march *m) { return HAS_DERIVATIVE ? m->active & ~m->active : less(m->behind, (real)(REAL_LARGEST)); }
-
 INLINE real ray_facing(const march *m, const sight *s) { return vec_dot(vec_normalize(s->surface.gradient), m->r.direction); }
 
 // The lanes that are behind such a place now.
@@ -41,14 +40,14 @@ INLINE void march_between(march *m, const sight *s, mask marching) {
 }
 
 // The slope of the distance ahead: no higher than its gradient says here.
-INLINE real march_slope(const march *m, const sight *s, int goal, __constant const struct March *settings) {
+INLINE real march_slope(const march *m, const sight *s, int goal, march_record settings) {
     if (HAS_DERIVATIVE) return m->slope;
     const real facing = ray_facing(m, s), here = FACING_SLOPE * step_scale_of(s->here, settings->step_scale) * facing;
     return pick(seeks_sheets(m, goal) & less(facing, R(0.0)), fmin(m->slope, here), m->slope);
 }
 
 // The slope where none has been measured yet.
-INLINE real march_first_slope(const march *m, const sight *s, __constant const struct March *settings) {
+INLINE real march_first_slope(const march *m, const sight *s, march_record settings) {
     if (HAS_DERIVATIVE) return m->slope;
     return (real)(settings->first_slope) * step_scale_of(s->here, settings->step_scale) * ray_facing(m, s);
 }

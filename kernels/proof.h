@@ -23,13 +23,11 @@ INLINE mask proof_under_way(const march *m) { return HAS_DERIVATIVE ? m->active 
 
 // The whole cone of a pixel is looked through for its points.
 INLINE real proof_reach(int goal) { return goal == GOAL_TOUCH ? R(1.0) : PROOF_REACH; }
-
 INLINE real proof_onward(int goal) { return goal == GOAL_TOUCH ? TOUCH_ONWARD : PROOF_ONWARD; }
-
 INLINE real proof_most(int goal) { return goal == GOAL_TOUCH ? TOUCH_STEPS : PROOF_STEPS; }
 
 // Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
-INLINE mask proof_step(march *m, const sight *s, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit) {
+INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings, orbit_record orbit) {
     if (HAS_DERIVATIVE || !any_lane(m->proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
@@ -60,8 +58,7 @@ INLINE mask proof_step(march *m, const sight *s, int goal, __constant const stru
 
 // Lanes that touched the solid begin a proof, and those under way go further down. The result are hits that need no proof: a
 // bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal,
-                        __constant const struct March *settings) {
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal, march_record settings) {
     if (HAS_DERIVATIVE) return touched;
     const mask done = touched & (bracketed | (is_point(m) & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone)));
     const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));

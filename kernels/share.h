@@ -11,8 +11,7 @@ typedef struct {
 // memory.
 INLINE share share_of_item(int item, int slice, queue q) {
     const int total = q.turns * q.wave, begin = LANES == 1 ? item : item * slice;
-    const share s = {begin, LANES == 1 ? total : min(begin + slice, total), LANES == 1 ? (int)get_global_size(0) : 1};
-    return s;
+    return (share){begin, LANES == 1 ? total : min(begin + slice, total), LANES == 1 ? (int)get_global_size(0) : 1};
 }
 
 // The next ray of a share that is wanted, or -1.
@@ -28,8 +27,7 @@ INLINE int share_next(share *left, queue q) {
 // What a march has found, as the stages after it read it.
 INLINE encounter encounter_of(crossing c) {
     const vec none = {R(0.0), R(0.0), R(0.0)};
-    const encounter e = {number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
-    return e;
+    return (encounter){number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
 }
 
 // Whether a ray was inside at its first look, although a cone had called the way there free: a distance can be too large for all the
@@ -44,8 +42,7 @@ INLINE int begins_anew(scalar hit, scalar steps, int number, queue q, int goal) 
 }
 
 // The `idle` lanes put down what they found, and take the next rays, which begin. `places`: the number of each lane's ray, or -1.
-INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q, int goal,
-                         __constant const struct March *settings) {
+INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q, int goal, march_record settings) {
     scalar found[ENCOUNTER_NORMAL * LANES];
     const encounter now = encounter_of(m->found);
 #define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
@@ -78,7 +75,7 @@ INLINE void lanes_begin(march *m, int *places) {
 }
 
 // The lanes that wait in the next step, as bits, after idle ones have taken new rays.
-INLINE uint lanes_waiting(march *m, share *left, int *places, queue q, int goal, __constant const struct March *settings) {
+INLINE uint lanes_waiting(march *m, share *left, int *places, queue q, int goal, march_record settings) {
     const uint idle = lanes_bits(~m->active);
     if (idle != ALL_LANES && (bits_count(idle) < REFILL || left->next >= left->end)) return idle;
     lanes_refill(m, idle, left, places, q, goal, settings);
@@ -86,8 +83,7 @@ INLINE uint lanes_waiting(march *m, share *left, int *places, queue q, int goal,
 }
 
 // Marches a share of a queue; the result is how many lanes have waited, in steps.
-INLINE int march_share(share mine, queue q, int goal, __constant const struct March *settings,
-                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE int march_share(share mine, queue q, int goal, march_record settings, orbit_record orbit, constants k) {
     share left = mine;
     march m = {0};
     int places[LANES];

@@ -6,7 +6,6 @@
 // How deep a place is in a formula's set is not known. Where such a set is cut out it leaves a hollow, in which a distance lies between
 // two bounds, that are folded as distances are: it is at least that to what was cut, and may be any.
 NUMBERS_PICKED(surface_point)
-#define surface_pick surface_point_pick
 
 // What is known of a surface as that of the other one.
 INLINE void surface_beside(surface_point *surface, surface_point other) {

@@ -24,8 +24,7 @@
 #include "solid_joins.h"
 
 // One solid. With a gradient wanted the Jacobian's distance; else the formula's own, which is asked in the lanes that are near.
-INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask active, int asks, real *cost,
-                           __constant const scalar *k) {
+INLINE solid_found solid_ask(orbit_record o, vec point, mask active, int asks, real *cost, constants k) {
     solid_found found = {R(0.0)};
     const vec own = solid_own(o, point);
     if (o->kind != SOLID_FORMULA) {
@@ -75,13 +74,13 @@ INLINE solid_found solid_ask(__constant const struct Orbit *o, vec point, mask a
 }
 
 // All of them.
-CALLED clearance solids_distance(const vec *point, mask active, int asks, __constant const struct Orbit *orbit,
-                                __constant const scalar *k, surface_point *surface) {
+CALLED clearance solids_distance(const vec *point, mask active, int asks, orbit_record orbit,
+                                constants k, surface_point *surface) {
     solid_found all;
     real cost = R(0.0);
     const real rounding = R(8.0) * (real)(REAL_EPSILON) * (fabs(point->x) + fabs(point->y) + fabs(point->z));
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         solid_found one = solid_ask(o, *point, active, asks, &cost, k);
         one.most = one.far;
         one.scale = (real)(o->step_scale);
@@ -94,18 +93,16 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, __cons
     const mask inside = active & all.inside;
     const real step = pick(inside, R(0.0), fmax(all.far, R(0.0)) / all.scale);
     const real near = pick(inside, R(0.0), fmax(all.near, R(0.0)) / all.scale);
-    const clearance result = {step, {cost, inside}, near, all.scale, pick(in_hollow(all), all.most / all.scale, step)};
-    return result;
+    return (clearance){step, {cost, inside}, near, all.scale, pick(in_hollow(all), all.most / all.scale, step)};
 }
 
-INLINE clearance orbit_dual_distance(vec point, mask active, int of, __constant const struct Orbit *orbit,
-                                     __constant const scalar *k, surface_point *surface) {
+INLINE clearance orbit_dual_distance(vec point, mask active, int of, orbit_record orbit, constants k, surface_point *surface) {
     if (!JOINED) return formula_dual_distance(point, active, of, orbit, k, surface);
     return solids_distance(&point, active, of == OF_SURFACE ? ASK_SURFACE : ASK_GRADIENT, orbit, k, surface);
 }
 
 // The estimate, which rays may go within the balls of formulas only; the most that it may be in hollows.
-INLINE clearance orbit_distance(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance orbit_distance(vec point, mask active, orbit_record orbit, constants k) {
     if (!JOINED) return formula_distance(point, active, orbit, k);
     surface_point ignored;
     clearance found = solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &ignored);
@@ -114,20 +111,18 @@ INLINE clearance orbit_distance(vec point, mask active, __constant const struct 
 }
 
 // Behind the walls of hollows: their gradients and counts. There is no gradient where a place is in another solid, or still in the hollow.
-INLINE clearance orbit_behind(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k,
-                              surface_point *surface) {
+INLINE clearance orbit_behind(vec point, mask active, orbit_record orbit, constants k, surface_point *surface) {
     return solids_distance(&point, active, ASK_BEHIND, orbit, k, surface);
 }
 
 // How far rays may go: by the scalar rule, if the formulas have one.
-INLINE clearance orbit_step(vec point, mask active, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE clearance orbit_step(vec point, mask active, orbit_record orbit, constants k) {
     if (!JOINED) return formula_distance(point, active, orbit, k);
     surface_point ignored;
     return solids_distance(&point, active, ASK_STEP, orbit, k, &ignored);
 }
 
-INLINE void orbit_steps(const vec *points, const mask *active, clearance *found, __constant const struct Orbit *orbit,
-                        __constant const scalar *k) {
+INLINE void orbit_steps(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
     if (!JOINED) {
         formula_distances(points, active, found, orbit, k);
         return;
@@ -139,21 +134,18 @@ INLINE void orbit_steps(const vec *points, const mask *active, clearance *found,
 INLINE real step_scale_of(clearance here, scalar own) { return JOINED ? here.scale : (real)(own); }
 
 // Which points belong to the solid of `limit` applications, if that is not the scene's own limit; then each has its own.
-CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __constant const struct Orbit *orbit,
-                             __constant const scalar *k) {
+CALLED orbit_end solids_inside(const vec *point, mask active, int limit, orbit_record orbit, constants k) {
     if (orbit->flows && limit == orbit->iterations) {
         surface_point ignored;
         return solids_distance(point, active, ASK_STEP, orbit, k, &ignored).end;
     }
     orbit_end all = {R(0.0), active & ~active};
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const vec own = solid_own(o, *point);
         mask inside = all.inside & ~all.inside;
         if (o->kind != SOLID_FORMULA) {
-            solid_found found;
-            solid_simple(o, own, &found);
-            inside = active & found.inside;
+            inside = active & simple_holds(o, own);
         } else {
             const vec arm = vec_sub(*point, vec_splat(o->ball));
             const real radius = (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
@@ -172,23 +164,22 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, __const
     return all;
 }
 
-INLINE orbit_end orbit_solid(vec point, mask active, int limit, __constant const struct Orbit *orbit,
-                             __constant const scalar *k) {
+INLINE orbit_end orbit_solid(vec point, mask active, int limit, orbit_record orbit, constants k) {
     if (!JOINED) return formula_end(point, active, limit, orbit, k);
     return solids_inside(&point, active, limit, orbit, k);
 }
 
-INLINE mask orbit_inside(vec point, mask active, int limit, __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE mask orbit_inside(vec point, mask active, int limit, orbit_record orbit, constants k) {
     return orbit_solid(point, active, limit, orbit, k).inside;
 }
 
 // The smooth escape count of one formula; 0 of a simple solid. `told`: of which lanes there is one.
-INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, __constant const struct Orbit *orbit) {
+INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, orbit_record orbit) {
     real smooth = R(0.0);
     end.count = surface.count;
     *told = end.inside & ~end.inside;
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const mask here = equal(surface.of, (real)((scalar)i));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
         smooth = pick(here, formula_smooth_count(end, surface, o), smooth);
@@ -198,7 +189,7 @@ INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, __co
 }
 
 // The smooth escape count of the formula that is nearest; where two flow together, between theirs.
-INLINE real smooth_count(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real smooth_count(orbit_end end, surface_point surface, orbit_record orbit) {
     if (!JOINED) return formula_smooth_count(end, surface, orbit);
     mask told;
     const real own = smooth_of_one(end, surface, &told, orbit);
@@ -210,12 +201,12 @@ INLINE real smooth_count(orbit_end end, surface_point surface, __constant const 
 }
 
 // The potential of the formula that is nearest, as if its ball were as large as the whole scene's; 0 on walls.
-INLINE real potential(orbit_end end, surface_point surface, __constant const struct Orbit *orbit) {
+INLINE real potential(orbit_end end, surface_point surface, orbit_record orbit) {
     if (!JOINED) return formula_potential(end, surface, orbit);
     real all = R(0.0);
     end.count = surface.count;
     for (int i = 0; i < orbit->solids; ++i) {
-        __constant const struct Orbit *o = orbit + i;
+        orbit_record o = orbit + i;
         const mask here = equal(surface.of, (real)((scalar)i)) & equal(surface.solid, (real)((scalar)o->object));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
         all = pick(here, formula_potential(end, surface, o) * (real)(o->potential_share), all);

@@ -19,8 +19,8 @@ INLINE real share_below(vec a, real most, real none) {
 // A wall of a hollow is seen from where no distance is known. It has the gradient and the counts of a place behind it, as far as light is
 // computed before other surfaces, or nearer where the solid ends before. Where the gradient straight behind it is like that on it, it
 // is smooth, and has its own. What is met of anything else keeps what it has.
-INLINE void surface_of_walls(ray r, encounter *met, mask walls, __constant const struct March *settings,
-                             __constant const struct Orbit *orbit, __constant const scalar *k, surface_point *surface, vec *normal) {
+INLINE void surface_of_walls(ray r, encounter *met, mask walls, march_record settings,
+                             orbit_record orbit, constants k, surface_point *surface, vec *normal) {
     const vec on_wall = *normal, hit = vec_along(r.origin, met->t, r.direction);
     real height = (real)(settings->near) * (real)(settings->detail) * (r.footprint + r.spread * met->t);
     mask found = walls & ~walls;
@@ -34,7 +34,7 @@ INLINE void surface_of_walls(ray r, encounter *met, mask walls, __constant const
         const vec gradient = vec_normalize(behind.gradient);
         const mask usable = asked & there.end.inside & less(R(0.5), vec_dot(gradient, gradient));
         const real share = pick(straight & usable, share_below(vec_sub(gradient, on_wall), LIKE, UNLIKE), R(0.0));
-        *surface = surface_pick(usable & ~straight, behind, *surface);
+        *surface = surface_point_pick(usable & ~straight, behind, *surface);
         *normal = vec_pick(usable & ~straight, gradient, vec_along(*normal, share, vec_sub(on_wall, *normal)));
         found |= usable;
         height *= pick(found, R(1.0), BEHIND_NEARER);
@@ -43,8 +43,8 @@ INLINE void surface_of_walls(ray r, encounter *met, mask walls, __constant const
 }
 
 // The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
-INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant const struct March *settings,
-                                 __constant const struct Orbit *orbit, __constant const scalar *k, clearance *there, vec *normal) {
+INLINE surface_point surface_lit(ray r, encounter *met, mask active, march_record settings,
+                                 orbit_record orbit, constants k, clearance *there, vec *normal) {
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     surface_point surface, found;
     vec wide, at_hit, place = vec_along(r.origin, met->touch, r.direction);
@@ -83,8 +83,8 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, __constant 
 #define POLISH_HEIGHT R(0.16667)
 // A place that does not depend on how the march came there: where the distance is a sixth of the cone, by the secant method (the
 // slope is that of a distance, -1, at first). Normals from the positions of points need it.
-INLINE surface_point surface_polished(ray r, encounter *met, mask active, __constant const struct March *settings,
-                                      __constant const struct Orbit *orbit, __constant const scalar *k, clearance *there) {
+INLINE surface_point surface_polished(ray r, encounter *met, mask active, march_record settings,
+                                      orbit_record orbit, constants k, clearance *there) {
     surface_point surface;
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     const real wanted = POLISH_HEIGHT * cone;
@@ -112,8 +112,7 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, __cons
 
 // The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
 // exactly it is may matter.
-INLINE void surface_at(ray r, encounter *met, mask active, int polished, __constant const struct March *settings,
-                       __constant const struct Orbit *orbit, __constant const scalar *k) {
+INLINE void surface_at(ray r, encounter *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
     met->touch = fmin(met->touch, met->last);
     clearance there;
     vec normal;
@@ -146,8 +145,7 @@ INLINE void surface_at(ray r, encounter *met, mask active, int polished, __const
 
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and where exactly
 // they are, if that matters.
-INLINE void look_at(queue q, int at, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                    __constant const scalar *k) {
+INLINE void look_at(queue q, int at, march_record settings, orbit_record orbit, constants k) {
     encounter e = queue_met(q, 0, at);
     const mask hit = mask_of(e.hit);
     if (!any_lane(hit)) return;
@@ -157,8 +155,7 @@ INLINE void look_at(queue q, int at, __constant const struct March *settings, __
 
 // Looks at the surfaces of a share that was marched. A single lane looks in a kernel of its own, which leaves it more registers for
 // the march.
-INLINE void look_at_share(share mine, queue q, int goal, __constant const struct March *settings, __constant const struct Orbit *orbit,
-                          __constant const scalar *k) {
+INLINE void look_at_share(share mine, queue q, int goal, march_record settings, orbit_record orbit, constants k) {
     if (LANES == 1 || (goal != GOAL_SURFACE && goal != GOAL_POINT)) return;
     for (int at = mine.next; at < mine.end; at += LANES) look_at(q, at, settings, orbit, k);
 }
