@@ -25,7 +25,7 @@ _DEFINED = re.compile(
     re.MULTILINE,
 )
 _INCLUDES = re.compile(
-    r'^#include "(?:lanes|vectors|structs|formula|orbit|solids|numbers/\w+)\.h"\n', re.MULTILINE
+    r'^#include "(?:lanes|vectors|structs|formula|orbits?|solids|numbers/\w+)\.h"\n', re.MULTILINE
 )
 
 HEAD = "".join(
