@@ -24,7 +24,7 @@ INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask 
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;
     const vec known = vec_pick(flat, there->normal, normal);
     const real numbers[4] = {known.x, known.y, known.z, smooth_count(here.end, surface, orbit)};
-    numbers_keep(numbers, 4, surface_beside_at(s, place, w), s.stride);
+    KEEP_NUMBERS(numbers, 4, surface_beside_at(s, place, w), s.stride);
 }
 
 STAGE(color_spots) {

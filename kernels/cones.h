@@ -56,7 +56,7 @@ INLINE void cones_send(pass s, queue q, int first, int first_tile, world w) {
     // Nobody marches what does not meet the bounds: nothing is there.
     encounter e = {0};
     e.t = (real)(REAL_LARGEST);
-    numbers_keep((const real *)&e, SHADOW_NUMBERS, q.met + first, q.stride);
+    KEEP_NUMBERS((const real *)&e, SHADOW_NUMBERS, q.met + first, q.stride);
 }
 
 // Where the rays of a packet's block begin, and what finding it has cost. A block in parts has its cone with each of them; it

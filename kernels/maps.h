@@ -62,7 +62,7 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
     *smooth = there->smooth;
     if (!w.settings->bump_surface) return;
     real known[4];
-    numbers_recall(known, 4, surface_beside_at(s, place, w), s.stride);
+    RECALL_NUMBERS(known, 4, surface_beside_at(s, place, w), s.stride);
     *normal = vec_of(known[0], known[1], known[2]);
     *smooth = known[3];
     const mask beside_set = ~of_the_set(there->object, w);

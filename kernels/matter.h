@@ -3,12 +3,14 @@
 
 INLINE void matter_keep(stage s, const pbr *p) {
     for (int first = 0; first < NUMBERS_OF(pbr); first += MOST_NUMBERS) {
-        numbers_keep((const real *)p + first, min(NUMBERS_OF(pbr) - first, MOST_NUMBERS), state_part(s, STATE_MATTER) + first * s.stride, s.stride);
+        const int count = min(NUMBERS_OF(pbr) - first, MOST_NUMBERS);
+        KEEP_NUMBERS((const real *)p + first, count, state_part(s, STATE_MATTER) + first * s.stride, s.stride);
     }
 }
 
 INLINE void matter_recall(stage s, pbr *p) {
     for (int first = 0; first < NUMBERS_OF(pbr); first += MOST_NUMBERS) {
-        numbers_recall((real *)p + first, min(NUMBERS_OF(pbr) - first, MOST_NUMBERS), state_part(s, STATE_MATTER) + first * s.stride, s.stride);
+        const int count = min(NUMBERS_OF(pbr) - first, MOST_NUMBERS);
+        RECALL_NUMBERS((real *)p + first, count, state_part(s, STATE_MATTER) + first * s.stride, s.stride);
     }
 }

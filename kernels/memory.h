@@ -1,8 +1,8 @@
 // Structs of reals in the device's memory. Of each number stand the lanes of all packets in a row, and number after number
 // `stride` apart, so that neighbouring work-items read neighbouring memory. Masks are kept as 1 or 0.
 #define NUMBERS_OF(type) ((int)(sizeof(type) / sizeof(real)))
-#define KEEP(thing, to, stride) numbers_keep((const real *)&(thing), NUMBERS_OF(thing), to, stride)
-#define RECALL(thing, from, stride) numbers_recall((real *)&(thing), NUMBERS_OF(thing), from, stride)
+#define KEEP(thing, to, stride) KEEP_NUMBERS((const real *)&(thing), NUMBERS_OF(thing), to, stride)
+#define RECALL(thing, from, stride) RECALL_NUMBERS((real *)&(thing), NUMBERS_OF(thing), from, stride)
 
 // Does something for each number below a count of at most MOST_NUMBERS. Where it is written out compilers hold the struct in
 // registers; a loop takes them less time.
@@ -19,15 +19,23 @@
 #define FOR_NUMBERS(count, DO) _Pragma("unroll 1") for (int i = 0; i < (count); ++i) { DO(i) }
 #endif
 
-INLINE void numbers_keep(const real *numbers, int count, __global scalar *to, int stride) {
-#define KEEP_NUMBER(i) lanes_store(numbers[i], to + i * stride);
-    WRITTEN_OUT(count, KEEP_NUMBER)
-}
-
-INLINE void numbers_recall(real *numbers, int count, __global const scalar *from, int stride) {
-#define RECALL_NUMBER(i) numbers[i] = lanes_load(from + i * stride);
-    WRITTEN_OUT(count, RECALL_NUMBER)
-}
+// Of constant counts: compilers then never see what is beyond them, which of functions' arguments they find out late.
+#define KEEP_NUMBERS(thing, count, to, stride)                                          \
+    do {                                                                                \
+        const real *kept_ = (thing);                                                    \
+        __global scalar *to_ = (to);                                                    \
+        const int stride_ = (stride);                                                   \
+        WRITTEN_OUT(count, KEEP_NUMBER)                                                 \
+    } while (0)
+#define KEEP_NUMBER(i) lanes_store(kept_[i], to_ + i * stride_);
+#define RECALL_NUMBERS(thing, count, from, stride)                                      \
+    do {                                                                                \
+        real *recalled_ = (thing);                                                      \
+        __global const scalar *from_ = (from);                                          \
+        const int stride_ = (stride);                                                   \
+        WRITTEN_OUT(count, RECALL_NUMBER)                                               \
+    } while (0)
+#define RECALL_NUMBER(i) recalled_[i] = lanes_load(from_ + i * stride_);
 
 // Of lanes `here` one struct of numbers, of the others another: TYPE_pick.
 #define NUMBERS_PICKED(type)                                                                                                 \

@@ -58,7 +58,7 @@ typedef struct {
 INLINE void queue_send(queue q, int turn, int first, ray r, mask wanted) {
     r.far = pick(wanted, r.far, R(-1.0));
     __global scalar *at = q.rays + turn * q.wave + first;
-    numbers_keep((const real *)&r, RAY_SENT, at, q.stride);
+    KEEP_NUMBERS((const real *)&r, RAY_SENT, at, q.stride);
     if (q.known) lanes_store(r.known, at + RAY_KNOWN * q.stride);
 }
 
@@ -76,7 +76,7 @@ INLINE ray queue_ray(queue q, int turn, int first) {
     ray r;
     r.known = RAY_NOTHING_KNOWN;
     __global const scalar *at = q.rays + turn * q.wave + first;
-    numbers_recall((real *)&r, RAY_SENT, at, q.stride);
+    RECALL_NUMBERS((real *)&r, RAY_SENT, at, q.stride);
     if (q.known) r.known = lanes_load(at + RAY_KNOWN * q.stride);
     return r;
 }
@@ -84,7 +84,7 @@ INLINE ray queue_ray(queue q, int turn, int first) {
 // What is kept of it; lanes that have met nothing hold anything.
 INLINE encounter encounter_kept(queue q, int at) {
     encounter e = {0};
-    numbers_recall((real *)&e, ENCOUNTER_SOLID, q.met + at, q.stride);
+    RECALL_NUMBERS((real *)&e, ENCOUNTER_SOLID, q.met + at, q.stride);
     if (q.numbers > ENCOUNTER_SOLID) e.solid = lanes_load(q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
         e.other = lanes_load(q.met + ENCOUNTER_OTHER * q.stride + at);
@@ -95,7 +95,7 @@ INLINE encounter encounter_kept(queue q, int at) {
 
 // Keeps what has been found out about a surface.
 INLINE void encounter_keep_surface(queue q, int at, const encounter *e) {
-    numbers_keep((const real *)e + ENCOUNTER_SURFACE, ENCOUNTER_SOLID - ENCOUNTER_SURFACE, q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
+    KEEP_NUMBERS((const real *)e + ENCOUNTER_SURFACE, ENCOUNTER_SOLID - ENCOUNTER_SURFACE, q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
     if (q.numbers > ENCOUNTER_SOLID) lanes_store(e->solid, q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
         lanes_store(e->other, q.met + ENCOUNTER_OTHER * q.stride + at);

@@ -28,53 +28,51 @@ INLINE __global scalar *asked_at(stage s, int place, int i, world w) {
 INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return asked_at(s, place, w.settings->bump_asked, w); }
 
 // A slice of a thing: numbers from `first` on.
-INLINE void slice_keep(stage s, const void *thing, int first, int count, int part, int i) {
-    numbers_keep((const real *)thing + first, count, state_part(s, part) + i * count * s.stride, s.stride);
-}
-INLINE void slice_recall(stage s, void *thing, int first, int count, int part, int i) {
-    numbers_recall((real *)thing + first, count, state_part(s, part) + i * count * s.stride, s.stride);
-}
+#define SLICE_KEEP(s, thing, first, count, part, i) \
+    KEEP_NUMBERS((const real *)(thing) + (first), count, state_part(s, part) + (i) * (count) * (s).stride, (s).stride)
+#define SLICE_RECALL(s, thing, first, count, part, i) \
+    RECALL_NUMBERS((real *)(thing) + (first), count, state_part(s, part) + (i) * (count) * (s).stride, (s).stride)
 
 INLINE void aim_keep(stage s, const aim *a) {
-    slice_keep(s, a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
-    if (KEEPS(s, STATE_THROUGH_LENS)) slice_keep(s, a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
+    SLICE_KEEP(s, a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
+    if (KEEPS(s, STATE_THROUGH_LENS)) SLICE_KEEP(s, a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
 }
 
 INLINE aim aim_kept(stage s) {
     aim a = {R(0.0)};
-    slice_recall(s, &a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
-    if (KEEPS(s, STATE_THROUGH_LENS)) slice_recall(s, &a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
+    SLICE_RECALL(s, &a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
+    if (KEEPS(s, STATE_THROUGH_LENS)) SLICE_RECALL(s, &a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
     return a;
 }
 
 // The first spot, or that after the last bounce.
 INLINE spot spot_kept(stage s, int bounce) {
     spot here = {R(0.0)};
-    slice_recall(s, &here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
-    if (KEEPS(s, STATE_SPOT_THING)) slice_recall(s, &here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
+    SLICE_RECALL(s, &here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
+    if (KEEPS(s, STATE_SPOT_THING)) SLICE_RECALL(s, &here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
     return here;
 }
 
 INLINE void spot_keep(stage s, const spot *here, int bounce) {
-    slice_keep(s, here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
-    if (KEEPS(s, STATE_SPOT_THING)) slice_keep(s, here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
+    SLICE_KEEP(s, here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
+    if (KEEPS(s, STATE_SPOT_THING)) SLICE_KEEP(s, here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
 }
 
 // What a path carries: slices that the scene does not need say that it is in the open.
 #define FLIGHT_FIRST (ASKED_LIGHT_NUMBERS + WITHIN_NUMBERS)
 INLINE void carried_keep(stage s, const carried *with) {
-    slice_keep(s, with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
-    if (KEEPS(s, STATE_WITHIN)) slice_keep(s, with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
-    if (KEEPS(s, STATE_FLIGHT)) slice_keep(s, with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
+    SLICE_KEEP(s, with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
+    if (KEEPS(s, STATE_WITHIN)) SLICE_KEEP(s, with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
+    if (KEEPS(s, STATE_FLIGHT)) SLICE_KEEP(s, with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
 }
 
 INLINE carried carried_kept(stage s) {
     carried with = {{R(0.0)}};
     with.wave = R(-1.0);
     with.flight = (real)(REAL_LARGEST);
-    slice_recall(s, &with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
-    if (KEEPS(s, STATE_WITHIN)) slice_recall(s, &with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
-    if (KEEPS(s, STATE_FLIGHT)) slice_recall(s, &with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
+    SLICE_RECALL(s, &with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
+    if (KEEPS(s, STATE_WITHIN)) SLICE_RECALL(s, &with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
+    if (KEEPS(s, STATE_FLIGHT)) SLICE_RECALL(s, &with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
     return with;
 }
 
