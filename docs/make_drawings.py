@@ -306,8 +306,18 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "join_points?",
         ),
     ),
-    ("what is seen there", ("send_air?", "color_spots?", "find_planes?", "add_glow?")),
-    ("direct light, mirrors", ("meet_objects?", "march_rays? lights", "gather_air?", "light_spots?")),
+    ("what is seen there", ("send_to_lights?", "send_air?", "color_spots?", "find_planes?", "add_glow?")),
+    (
+        "direct light, mirrors",
+        (
+            "meet_objects?",
+            "march_rays? lights",
+            "gather_air?",
+            "meet_lights?",
+            "gather_light?",
+            "light_spots?",
+        ),
+    ),
     (
         "or light along paths",
         (

@@ -25,10 +25,13 @@ INLINE void block_middles(pass s, int first, int count, int first_tile, real *x,
 
 // The middle ray of a block as wide as all rays of its pixels, and `margin` more: `reach` pixels to each side.
 INLINE ray block_cone(real x, real y, real reach, world w) {
-    ray axis = camera_ray(x, y, R(0.0), R(0.0), R(0.0), w.view);
+    aim at = {R(1.0), x, y, R(0.0), R(0.0), R(0.0), R(0.0)};
+    ray axis = eye_ray(&at, w.view);
     real footprint = R(0.0), spread = R(0.0);
     for (int corner = 0; corner < TURNS(4); ++corner) {
-        const ray r = camera_ray(x + (corner & 1 ? reach : -reach), y + (corner & 2 ? reach : -reach), R(0.0), R(0.0), R(0.0), w.view);
+        at.x = x + (corner & 1 ? reach : -reach);
+        at.y = y + (corner & 2 ? reach : -reach);
+        const ray r = eye_ray(&at, w.view);
         const vec offset = vec_cross(vec_sub(r.origin, axis.origin), axis.direction);
         const vec aside = vec_cross(r.direction, axis.direction);
         footprint = fmax(footprint, sqrt(vec_dot(offset, offset)));

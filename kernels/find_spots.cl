@@ -1,21 +1,18 @@
 // Entry point: spots of what rays have met. It knows no formula.
 #include "stages.h"
 #include "spot_found.h"
+#include "phase.h"
 #include "flights.h"
 #include "media.h"
 
 // Makes spots of what the rays along the path have met, and sends the rays that bring their light.
 STAGE(find_spots) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     if (HAS(w, PATHS) && paths_are_over(s)) return;
-    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
     path so_far;
     const ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
-    tally cost;
-    STATE_RECALL(s, cost, STATE_TALLY);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
     real object;
     vec place;
     encounter seen = surface_met(s, 0, r, &object, &place, w);
@@ -27,5 +24,5 @@ STAGE(find_spots) {
         const carried with = carried_kept(s);
         found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
     }
-    spot_found(s, &here.at, a, r, so_far.on_path, found, at_first, cost, next_turns, w);
+    spot_found(s, r, so_far.on_path, found, at_first, cost, next_turns, w);
 }

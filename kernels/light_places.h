@@ -28,8 +28,6 @@ INLINE real light_density(light_record light, vec point, vec direction) {
     return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
 }
 
-INLINE int light_is_seen(light_record light) { return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE; }
-
 // Light from one of the directions that `light_direction` finds: the mean over these is the light's.
 INLINE incidence light_along(light_record light, vec point, vec direction) {
     incidence in = light_at(light, point);

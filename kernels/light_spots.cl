@@ -4,8 +4,6 @@
 #include "sky.h"
 #include "phase.h"
 #include "spot.h"
-#include "set_lights.h"
-#include "light_places.h"
 #include "secondary.h"
 #include "fog.h"
 #include "look.h"
@@ -14,21 +12,22 @@
 
 // Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
 STAGE(light_spots) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
     spot found = spot_kept(s, bounce);
-    tally cost;
-    STATE_RECALL(s, cost, STATE_TALLY);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const vec direction = arrived.direction;
-    path_meets_light(s, &so_far, &found, arrived, w);
+    if (KEEPS(s, STATE_LAMP_BEFORE)) path_ends_at_light(s, &so_far);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
         if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
-        gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
+        if (KEEPS(s, STATE_GATHERED)) {
+            STATE_RECALL(s, gathered, STATE_GATHERED);
+        } else {
+            gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
+        }
         gathered = color_pick(on_face(&found), found.tint, gathered);
     }
     if (bounce == 0 && KEEPS(s, STATE_GLANCE)) {

@@ -2,7 +2,7 @@
 
 // The light that one light ray adds, for every normal of the spot.
 INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open, vec to_viewer,
-                    __constant const struct Light *light, look l, world w) {
+                    light_record light, look l, world w) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < facet_count(s.bounce, w); ++i) {
         const facet f = facet_of(s, here, i, w);
@@ -12,49 +12,17 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
     return sum;
 }
 
-// The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
-INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
-                          tally *cost, world w) {
-    const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
-    const encounter met = queue_met(s.q, turn, s.slot);
-    tally_met(cost, met, 0);
-    color shines;
-    mask shadow;
-    const int number = s.sample * w.settings->set_rays + of_set;
-    incidence in;
-    set_incidence(here, &place.at, number, s.bounce, &in, &shines, &shadow, w);
-    const color white = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, w.lights + w.settings->light_count, l, w);
-    return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
-}
-
-// The light that the spot's rays have brought.
+// The light of lights without a size.
 INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     const look l = look_of(here, w);
-    real open = R(1.0);
-    int turn = 0;
-    if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
-    for (; turn < hemisphere_turns(w); ++turn) {
-        const encounter met = queue_met(s.q, turn, s.slot);
-        tally_met(cost, met, 0);
-        gathered = color_add(gathered, ambient_light(s, here, turn, met, surround_of(l), w, &open));
-    }
-    gathered = limited(gathered, w.settings);
-    for (; turn < turns_for_light(w); ++turn) {
-        const int number = turn - hemisphere_turns(w);
-        const int of_set = number - w.settings->light_count * w.settings->light_rays;
-        if (of_set >= 0) {
-            gathered = color_add(gathered, set_gathered(s, here, to_viewer, turn, of_set, open, l, cost, w));
-            continue;
-        }
-        __constant const struct Light *light = w.lights + number / w.settings->light_rays;
-        if (number % w.settings->light_rays >= light->rays) continue;
+    for (int turn = 0; turn < w.settings->light_count; ++turn) {
+        light_record light = w.lights + turn;
         const encounter met = queue_met(s.q, turn, s.slot);
         tally_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
-        if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
-        const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l, w);
+        const color more = lit_by(s, here, in, ~mask_of(met.hit), R(1.0), to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }
     return color_add(gathered, l.emission);
@@ -78,16 +46,12 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     spot_keep(s, found, 0);
 }
 
-// A path that meets a light before the surface ends there.
-INLINE void path_meets_light(stage s, path *so_far, spot *found, ray arrived, world w) {
-    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
-    color shows = color_of(R(0.0), R(0.0), R(0.0));
-    real density = R(0.0), weight = R(0.0);
-    const mask met = mask_of(so_far->on_path) & nearest_light(&arrived.origin, &arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
-    if (!any_lane(met)) return;
-    so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(shows, so_far->through)), so_far->seen);
+// A path that has met a light before the surface ends there.
+INLINE void path_ends_at_light(stage s, path *so_far) {
+    STATE_KEPT(s, lamp_before, there, STATE_LAMP_BEFORE);
+    const mask met = mask_of(there.met);
+    so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(there.shows, so_far->through)), so_far->seen);
     so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);
-    spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), met);
 }
 
 // Adds the light of the path's present spot, or of the sky past it, to what the path has seen.

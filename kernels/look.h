@@ -5,7 +5,7 @@ typedef struct {
 } look;
 NUMBERS_PICKED(look)
 
-INLINE look look_of_object(real object, world w) {
+CALLED look look_of_object(real object, world w) {
     material_record m = w.material;
     const color none = color_of(R(0.0), R(0.0), R(0.0));
     const real specular = (real)(m->specular), mirror = (real)(m->reflection);

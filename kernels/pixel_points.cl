@@ -41,5 +41,5 @@ STAGE(join_points) {
         points_add(s, &points, turn, each, met, object, place, w);
     }
     at_first.coverage = points.count * (R(1.0) / (real)((scalar)settings->point_count));
-    spot_found(s, &here.at, a, r, a.wanted, points_spot(s, &points, w), at_first, cost, next_turns, w);
+    spot_found(s, r, a.wanted, points_spot(s, &points, w), at_first, cost, next_turns, w);
 }

@@ -36,6 +36,8 @@ INLINE real light_shape(light_record light, vec toward, real square) {
     return t * t * (R(3.0) - R(2.0) * t);
 }
 
+INLINE int light_is_seen(light_record light) { return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE; }
+
 INLINE incidence light_at(light_record light, vec point) {
     incidence in = light_from_middle(light, point);
     if (light->kind >= LIGHT_SPOT) in.strength *= light_shape(light, in.toward, in.distance * in.distance);

@@ -1,14 +1,9 @@
 // What becomes of a spot that has been found.
-#include "environment.h"
-#include "phase.h"
 #include "spot.h"
-#include "set_lights.h"
-#include "light_places.h"
 #include "secondary.h"
-#include "fog.h"
 
 // Keeps it, or the face of a cut before it, and sends the rays that bring its light. `r`: the ray that has met it.
-INLINE void spot_found(stage s, const packet_pixels *at, aim a, ray r, real on_path, spot found, sighting at_first, tally cost, int next_turns,
+INLINE void spot_found(stage s, ray r, real on_path, spot found, sighting at_first, tally cost, int next_turns,
                        world w) {
     if (KEEPS(s, STATE_FACE)) at_first.coverage = pick(spot_on_face(s, r, &found, w), R(1.0), at_first.coverage);
     if (s.bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
@@ -16,5 +11,5 @@ INLINE void spot_found(stage s, const packet_pixels *at, aim a, ray r, real on_p
     found.found = pick(mask_of(on_path), found.found, R(0.0));
     if (w.material->coloring == COLORING_RESIDUAL) found.quantity = found.residual;
     spot_keep(s, &found, s.bounce);
-    send_for_light(s, at, &found, next_turns, w);
+    if (!KEEPS(s, STATE_GATHERED)) send_to_small_lights(s, &found, next_turns, w);
 }

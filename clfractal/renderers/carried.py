@@ -132,6 +132,12 @@ PATH = _carried(
     ("color", "through", "part of what comes next that reaches the eye"),
     ("color", "seen", "light so far"),
 )
+LAMP_BEFORE = _carried(
+    "lamp_before",
+    "A light that is seen before a spot.",
+    ("real", "met", "whether there is one"),
+    ("color", "shows", ""),
+)
 ASKED_LIGHT = _carried(
     "asked_light",
     "What a path awaits of the lights at its last spot.",
@@ -269,6 +275,7 @@ TYPES = (
     PATH,
     CARRIED,
     HALT,
+    LAMP_BEFORE,
     FACE,
     LAYERS,
     GLANCE,

@@ -18,6 +18,7 @@ from clfractal.renderers.carried import (
     FLIGHT,
     GLANCE,
     HALT,
+    LAMP_BEFORE,
     LAYERS,
     MATTES,
     PARTS_OF_LIGHT,
@@ -39,7 +40,15 @@ from clfractal.renderers.passes import has_mattes, has_parts
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces
-from clfractal.renderers.waves import air_turns, finds_materials, has_cones, has_lens, has_media
+from clfractal.renderers.waves import (
+    air_turns,
+    finds_materials,
+    has_cones,
+    has_lens,
+    has_media,
+    has_wide_lights,
+    meets_lights,
+)
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 
@@ -97,6 +106,9 @@ PARTS = (
     Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
     Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_cloudy_glass(scene))),
     Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
+    # What rays to wide lights have brought, and lights that are before the spot.
+    Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),
+    Part("LAMP_BEFORE", LAMP_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),
     Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
     Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
     # What the formula was asked for the present spot's material; and the same around it, with the normal and escape count

@@ -192,6 +192,7 @@ PROGRAMS = (
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),
     _Program("objects", "objects.cl", ("meet_objects", "look_at_objects"), state_defines),
     _Program("light", "light_spots.cl", ("light_spots",), state_defines),
+    _Program("wide", "wide_lights.cl", ("send_to_lights", "gather_light", "meet_lights"), state_defines),
     _Program("air", "air_rays.cl", ("send_air", "gather_air"), state_defines),
     _Program("materials", "find_materials.cl", ("find_materials",), state_defines),
     _Program("scatter", "scatter_paths.cl", ("scatter_paths",), path_defines),

@@ -6,9 +6,10 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     begin_shots  march  find_spots (or send_points  march  join_points)  [color_spots]  march  light_spots
 
-with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[find_planes]` and
-`[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays that look
-for a spot; each mirror adds what follows `begin_shots` but for the points.
+with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[send_to_lights]`
+after the spots and `[meet_lights] [gather_light]` before `light_spots` where direct light comes from more than single
+directions, with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays
+that look for a spot; each mirror adds what follows `begin_shots` but for the points.
 With `lighting.mode: path` in the place of the last two
 
     [find_materials]  scatter_paths  march  gather_paths
@@ -37,7 +38,7 @@ from clfractal.renderers.planes import has_faces
 from clfractal.renderers.records import bounces, hemisphere_rays, light_rays
 from clfractal.renderers.set_lights import single_lights
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import SetLight
+from clfractal.scene.lighting import RectangleLight, SetLight, SphereLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.solids import joins_smoothly
@@ -111,6 +112,21 @@ def light_turns(scene: Scene) -> int:
     rays = hemisphere_rays(scene)
     to_set = max((light.used_rays for light in scene.lights if isinstance(light, SetLight)), default=0)
     return rays.cosine + rays.map + len(single_lights(scene)) * light_rays(scene) + to_set
+
+
+def meets_lights(scene: Scene) -> bool:
+    """Whether paths of direct light may meet lights: those that have a place and a size."""
+    if isinstance(scene.lighting, PathLighting):
+        return False
+    return any(isinstance(light, (SphereLight, RectangleLight, SetLight)) for light in scene.lights)
+
+
+def has_wide_lights(scene: Scene) -> bool:
+    """Whether direct light comes from more than single directions: from lights with a size, or out of the hemisphere."""
+    if isinstance(scene.lighting, PathLighting):
+        return False
+    rays = hemisphere_rays(scene)
+    return rays.cosine + rays.map > 0 or any(light.has_size for light in scene.lights)
 
 
 def air_turns(scene: Scene) -> int:
@@ -212,6 +228,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield from of_objects(looked, turns + within)
         kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
         yield stage(kernel, turns, bounce=bounce, next_turns=after)
+        if has_wide_lights(scene):
+            yield stage("send_to_lights", bounce=bounce, next_turns=after)
         air, paths = air_turns(scene) if bounce == 0 else 0, isinstance(scene.lighting, PathLighting)
         if air > 0:  # behind the rays for light
             yield stage("send_air", next_turns=1 if paths else after)
@@ -242,6 +260,10 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield from _marched(marching, after + air, GOAL_SHADOW)
         if air > 0:
             yield stage("gather_air", after + air, next_turns=after)
+        if meets_lights(scene):
+            yield stage("meet_lights", bounce=bounce)
+        if has_wide_lights(scene):
+            yield stage("gather_light", after + air, bounce=bounce)
         yield stage("light_spots", after + air, bounce=bounce)
     if isinstance(scene.lighting, PathLighting):
         yield from of_objects(met, 1)

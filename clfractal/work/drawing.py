@@ -284,7 +284,8 @@ class Drawing:
         # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all. Those begin first
         # that take longest, which are the longest texts, since a compiler that is left with one at the end is waited for.
         ended = threading.Event()
-        pool = ThreadPoolExecutor(min(len(texts), children.processors()))
+        # One thread more than compilers, so that none waits while what it has made is loaded.
+        pool = ThreadPoolExecutor(min(len(texts), children.processors() + 1))
         try:
             # Oclgrind's checks of memory are lost with the thread that they began in.
             if is_simulator(self.device.info):

@@ -28,6 +28,7 @@ kernels/camera.h: render/surface_analytic render/lens_and_fog render/stereo_view
 kernels/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
 kernels/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
 kernels/secondary.h: render/surface_rays render/surface_light
+kernels/wide_lights.h: render/surface_rays render/surface_light render/light_shapes
 kernels/queue.h: render/surface_rays render/pixel_points
 kernels/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
 kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog

@@ -28,11 +28,12 @@ LAMPS = [
 ]
 # Of each feature what a scene says, and the programs that it needs beside those of a plain one.
 FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
-    "lights": ({"lights": LAMPS}, set()),
-    "lights on the set": ({"lights": [{"type": "set", "trap": {"shape": "sphere"}}]}, set()),
-    "sky": ({"environment": {"sky": {}, "rays": 2}}, set()),
-    "map": ({"environment": {"name": "studio", "rays": 2, "background": True}}, set()),
-    "occlusion": ({"renderer": {"ambient_occlusion": {"rays": 2}}}, set()),
+    "points that shine": ({"lights": LAMPS[2:4]}, set()),
+    "lights": ({"lights": LAMPS}, {"wide"}),
+    "lights on the set": ({"lights": [{"type": "set", "trap": {"shape": "sphere"}}]}, {"wide"}),
+    "sky": ({"environment": {"sky": {}, "rays": 2}}, {"wide"}),
+    "map": ({"environment": {"name": "studio", "rays": 2, "background": True}}, {"wide"}),
+    "occlusion": ({"renderer": {"ambient_occlusion": {"rays": 2}}}, {"wide"}),
     "fog": ({"fog": {"density": 0.1, "height": 2}}, set()),
     "shafts": ({"fog": {"density": 0.1, "scattering": {}}}, {"air"}),
     "mirror": ({"material": {"reflection": 0.5}}, set()),
@@ -57,9 +58,9 @@ RISES = {"curve": [[0, 0.1], [1, 0.4]]}
 GLOW = {"glow": {"emission": {"luminance": 3}}}
 # The same of scenes along paths.
 FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
-    "lights": FEATURES["lights"],
-    "lights on the set": FEATURES["lights on the set"],
-    "map": FEATURES["map"],
+    "lights": (FEATURES["lights"][0], set()),
+    "lights on the set": (FEATURES["lights on the set"][0], set()),
+    "map": (FEATURES["map"][0], set()),
     "shining object": ({"objects": {"ball": {**BALL, "material": "glow"}}, "materials": GLOW}, {"objects"}),
     "map of a material": (
         {
