@@ -341,7 +341,9 @@ _BESIDE = {
     "march_rays": (
         "look_at_surfaces",
         "march_points",
+        "look_at_points",
         "step_rays",
+        "look_where_steps_end",
     ),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }

@@ -13,3 +13,10 @@ STAGE(march_rays) {
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next < mine.end && !WAS_CANCELLED) march_and_look(mine, q, goal, STATISTICS_HERE + STATISTIC_WAITS, settings, orbit, k);
 }
+
+#if LANES == 1
+STAGE(look_at_surfaces) {
+    const queue q = MARCH_QUEUE(0);
+    if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k);
+}
+#endif

@@ -12,10 +12,3 @@ INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting
     // Nobody counts those of the cones.
     if (LANES > 1 && goal != GOAL_CONE) atomic_add(waiting, (uint)waits);
 }
-
-#if LANES == 1
-STAGE(look_at_surfaces) {
-    const queue q = MARCH_QUEUE(settings->point_count > 1);
-    if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k);
-}
-#endif

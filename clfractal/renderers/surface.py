@@ -184,9 +184,9 @@ class _Program:
 PROGRAMS = (
     _Program("rays", "march.cl", ("march_rays", "look_at_surfaces"), march_defines, formula=True),
     _Program(
-        "point_rays", "march_points.cl", ("march_points", "look_at_surfaces"), march_defines, formula=True
+        "point_rays", "march_points.cl", ("march_points", "look_at_points"), march_defines, formula=True
     ),
-    _Program("steps", "march_steps.cl", ("step_rays", "look_at_surfaces"), march_defines, formula=True),
+    _Program("steps", "march_steps.cl", ("step_rays", "look_where_steps_end"), march_defines, formula=True),
     _Program("begin", "begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
     _Program("points", "pixel_points.cl", ("send_points", "join_points"), state_defines),
     _Program("spots", "find_spots.cl", ("find_spots",), state_defines),

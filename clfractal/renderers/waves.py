@@ -153,6 +153,8 @@ OVER: dict[str, Over] = {
     "walk_inside": "rays",
     "send_cones": "packets of rays",
     "look_at_surfaces": "packets of rays",
+    "look_at_points": "packets of rays",
+    "look_where_steps_end": "packets of rays",
     "look_inside_set": "packets of rays",
     "look_where_walks_end": "packets of rays",
     "meet_objects": "packets of rays",
@@ -161,6 +163,8 @@ OVER: dict[str, Over] = {
 # Packets look at surfaces where they march.
 OF_SINGLE_LANES = (
     "look_at_surfaces",
+    "look_at_points",
+    "look_where_steps_end",
     "look_inside_set",
     "look_where_walks_end",
 )
@@ -168,8 +172,12 @@ OF_SINGLE_LANES = (
 
 def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
     """The kernels of `march.cl`, `march_points.cl` or `march_steps.cl`: packets look at surfaces where they march."""
-    march = "march_points" if scene.surface.used_points.count > 1 else "march_rays"
-    found = ("step_rays" if scene.surface.search == "steps" else march, "look_at_surfaces")
+    if scene.surface.search == "steps":
+        found = ("step_rays", "look_where_steps_end")
+    elif scene.surface.used_points.count > 1:
+        found = ("march_points", "look_at_points")
+    else:
+        found = ("march_rays", "look_at_surfaces")
     return found if plan.lanes == 1 else found[:1]
 
 

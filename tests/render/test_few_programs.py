@@ -257,11 +257,12 @@ MARCHES = {
 }
 
 
+@pytest.mark.parametrize("lanes", [1, 16])
 @pytest.mark.parametrize("march", MARCHES)
-def test_marches_are_stages(march: str, device: Device) -> None:
+def test_marches_are_stages(march: str, lanes: int, device: Device) -> None:
     """Rays, those of a pixel's points, and the search by steps have kernels of their own; what these are told is data."""
     plain, points = (
-        texts(scene(FORMULA, renderer={**MARCHES[march], **more}), device)
+        texts(scene(FORMULA, renderer={**MARCHES[march], **more}), device, lanes=lanes)
         for more in ({}, {"bounds": {"center": [1, 0, 0], "radius": 4}, "max_steps": 50})
     )
     assert points == plain
@@ -337,6 +338,12 @@ def test_only_the_formulas_in_a_scene_are_text(join: str, device: Device) -> Non
     known = texts(scene(FORMULA, objects={"other": HAST}, **ASKING), device)
     assert texts(scene(FORMULA, objects=objects, **ASKING), device) == known
     assert known["rays"] != texts(scene(FORMULA, objects=JOINED["cut"], **ASKING), device)["rays"]
+
+
+def test_each_stage_is_of_one_program() -> None:
+    """A scene builds the programs that have its stages."""
+    kernels = [kernel for each in PROGRAMS for kernel in each.kernels]
+    assert len(kernels) == len(set(kernels))
 
 
 def test_the_drawing_shows_every_stage() -> None:
