@@ -8,14 +8,21 @@ import signal
 import subprocess
 import time
 import zlib
+from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import clfractal
+from clfractal.commands.shell import Shell
+from clfractal.commands.unfinished import Unfinished, continued
+from clfractal.device.select import choose
 from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
+from clfractal.scene.load import load_scene
+from clfractal.work.prepare import prepare
 from tests.shell import SCENE, Ended, command, environment, process
 from tests.variants import one_of
 
@@ -146,6 +153,27 @@ def test_another_version_or_device_is_not_resumed(tmp_path: Path) -> None:
         (tmp_path / "a.png.partial").write_bytes(changed)
         ended = process(["render", "scene.yaml", "-o", "a.png", "--resume"], tmp_path)
         assert ended.is_one_line(2, "a.png.partial: cannot be resumed: ", said)
+
+
+def test_work_goes_on_with_the_lanes_that_it_began_with(tmp_path: Path) -> None:
+    """The fastest lanes may have been measured since."""
+    began, other = 1, 4
+    whole, resumed = tmp_path / "whole", tmp_path / "resumed"
+    (tmp_path / "heavy.yaml").write_text(HEAVY)
+    job = prepare(load_scene(tmp_path / "heavy.yaml"), choose())
+    view = replace(job.views[0], plan=replace(job.views[0].plan, lanes=began))
+    begun = replace(job, views=(view,))
+    shell = Shell(owns_process=False)
+    with suppress(KeyboardInterrupt), Unfinished(begun, {}, whole, shell, resume=False) as work:
+        work.films[0].put(0, np.zeros((len(job.channels), 32, 32), np.float32))
+        raise KeyboardInterrupt
+    later = replace(job, views=(replace(view, plan=replace(view.plan, lanes=other)),))
+    assert continued(later, whole).views[0].plan.lanes == began
+    assert continued(later, resumed).views[0].plan.lanes == other  # nothing was begun there
+    with Unfinished(continued(later, whole), {}, whole, shell, resume=True) as work:
+        assert work.films[0].done.sum() == 1
+    elsewhere = replace(later, device=replace(later.device, driver="another"))
+    assert continued(elsewhere, whole).views[0].plan.lanes == other
 
 
 def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:

@@ -27,8 +27,8 @@ from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, DeviceInfo, choose, has_float64
 from clfractal.errors import ClfractalError, Stopped, Where
 from clfractal.pictures.makers import Maker
-from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.work.job import Job
+from clfractal.work.prepare import pays_to_measure, with_lanes
 from clfractal.work.run import Floats, Tally, Tiles, WorkItem
 
 if TYPE_CHECKING:
@@ -275,10 +275,7 @@ def _fitted(job: Job, device: Device) -> Job:
     """The job, with this device's lanes if it is of another kind than the one that decided."""
     if device.info.key == job.device.key:
         return job
-    views = []
-    for view in job.views:
-        lanes = best_lanes(device, view.plan.precision, rule_of(view.scene.chain))
-        views.append(replace(view, plan=replace(view.plan, lanes=lanes)))
+    views = with_lanes(job.views, device, measures=pays_to_measure(job.views, device))
     return replace(job, views=tuple(views), device=device.info)
 
 

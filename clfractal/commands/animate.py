@@ -203,7 +203,11 @@ def _render_on(
         return not (order.resume and _is_there(job, paths, kept.at(number)))
 
     jobs = engine.in_order(
-        map(scenes.scene, files), is_missing, precision=order.precision, samples=order.samples
+        map(scenes.scene, files),
+        is_missing,
+        precision=order.precision,
+        samples=order.samples,
+        pictures=len(files),
     )
     removed = told = False
     kinds: set[str] = set()

@@ -21,6 +21,7 @@ from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, DeviceError, Where
 from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.formulas.opencl import operations_per_application
+from clfractal.renderers.lanes import march_reports
 from clfractal.renderers.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -135,6 +136,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
     peak = fma_peak(chosen, "float32")
+    march_reports(chosen, "float32", on_start=shell.say)
     rows = []
     for name in names:
         if name == GRID_ROW:

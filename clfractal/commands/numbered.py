@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clfractal.commands.progress import Reporter
-from clfractal.commands.unfinished import Unfinished
+from clfractal.commands.unfinished import Unfinished, continued
 from clfractal.work.films import JobFilms
 from clfractal.work.run import run
 from clfractal.work.save import save_job
@@ -60,6 +60,8 @@ def render_one(
         rendered = time.perf_counter()
         _save(job, films.films, paths, header, bits or {})
         return _made(state, begun, rendered)
+    if resume:
+        job = continued(job, paths[0])
     with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
         state = _run(job, unfinished.films, engine, reporter)
         rendered = time.perf_counter()

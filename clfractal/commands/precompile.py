@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from clfractal.commands.order import naming_options
 from clfractal.commands.pipes import piped
@@ -14,9 +13,6 @@ from clfractal.commands.scenes import scene_files
 from clfractal.commands.shell import Shell
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-
-if TYPE_CHECKING:
-    from clfractal.work.precompile import Precompilation
 
 _MEGABYTE = 1e6
 
@@ -35,13 +31,18 @@ def precompile(sources: Sequence[str], device: str | None, precision: str | None
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.device import cache
     from clfractal.device.select import choose
-    from clfractal.work.precompile import Precompilation, library_scenes
+    from clfractal.work.precompile import Precompilation, library_count, library_scenes
 
     chosen = choose(device)
-    scenes = named.values() if named else library_scenes(scene_files().values())
-    with naming_options():
-        course = Precompilation(chosen, scenes, precision=precision, on_start=shell.say)
-    done = _Done(shell, course)
+    files = scene_files().values()
+    scenes = named.values() if named else library_scenes(files)
+    read = _Done(shell, "reading scenes", len(named) or library_count(files))
+    try:
+        with naming_options():
+            course = Precompilation(chosen, scenes, precision=precision, read=read, on_start=shell.say)
+    finally:
+        read.close()
+    done = _Done(shell, "compiling", course.steps)
     shell.state = done.interrupted
     try:
         found = course.run(done)
@@ -67,11 +68,11 @@ def _loaded(source: str, shell: Shell) -> Scene:
 class _Done:
     """Shows how much is done: a bar on a terminal, elsewhere a line now and then."""
 
-    def __init__(self, shell: Shell, course: Precompilation) -> None:
-        self._shell, self._steps, self._count = shell, course.steps, 0
+    def __init__(self, shell: Shell, doing: str, steps: int) -> None:
+        self._shell, self._doing, self._steps, self._count = shell, doing, steps, 0
         self._lines = Lines()
         is_shown = shell.terminal and not shell.quiet
-        self._bar = counting_bar(shell, "compiling", self._steps) if is_shown else None
+        self._bar = counting_bar(shell, doing, steps) if is_shown else None
 
     def __call__(self, count: int) -> None:
         self._shell.alive()
@@ -80,7 +81,7 @@ class _Done:
             self._bar.update(self._bar.task_ids[0], completed=count)
             self._bar.refresh()
         elif self._lines.due(count / self._steps):
-            self._shell.say(f"compiling: {count} of {self._steps}")
+            self._shell.say(f"{self._doing}: {count} of {self._steps}")
 
     def close(self) -> None:
         """Removes the bar."""

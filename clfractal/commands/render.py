@@ -78,7 +78,7 @@ def _render(
 ) -> None:
     """Renders a scene that was checked; `start` is when the command began, by `time.perf_counter`."""
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
-    from clfractal.commands.unfinished import Unfinished
+    from clfractal.commands.unfinished import Unfinished, continued
     from clfractal.pictures.outputs import output_files
     from clfractal.work import stats
     from clfractal.work.remarks import remarks_of
@@ -90,6 +90,8 @@ def _render(
         job = engine.prepare(scene, region=region, samples=order.samples, precision=order.precision)
     if job.remark:
         shell.say(f"{order.scene}: {job.remark}")
+    if order.resume:
+        job = continued(job, _beside(order))
     header = job.header()
     with Unfinished(job, header, _beside(order), shell, resume=order.resume) as unfinished:
         reporter = Reporter(shell, job.tiles)

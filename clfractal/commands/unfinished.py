@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import glob
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
 from clfractal.commands.shell import Shell
+from clfractal.device.tune import LANE_COUNTS
 from clfractal.files.frame_names import PARTIAL
+from clfractal.files.journal import identity_of
 from clfractal.pictures.compose import Side
 from clfractal.pictures.store import JournalFilm
 from clfractal.scene.model import Scene
@@ -96,6 +99,21 @@ class Unfinished:
             if stale not in self.paths:
                 shell.say(f"{stale}: earlier work is discarded")
                 stale.unlink(missing_ok=True)
+
+
+def continued(job: Job, output: Path) -> Job:
+    """The job with the lanes of the unfinished work beside an output, if this device's driver began it.
+
+    That may have been before the fastest lanes were measured.
+    """
+    views = []
+    for view, path in zip(job.views, partial_paths(job, output), strict=True):
+        begun = identity_of(path) or {}
+        lanes = begun.get("lanes")
+        if begun.get("driver") == job.device.key and lanes in LANE_COUNTS:
+            view = replace(view, plan=replace(view.plan, lanes=lanes))
+        views.append(view)
+    return replace(job, views=tuple(views))
 
 
 def partial_paths(job: Job, output: Path) -> list[Path]:

@@ -117,7 +117,8 @@ def _flatten(
     flattener.add(entry, Where())
     text = "\n".join(flattener.lines) + "\n"
     # What a text never names makes no other program of it.
-    named = set(_NAME.findall(text))
+    known = [_read(*each).names for each in flattener.texts.items()]
+    named = {name for name, _ in defines if any(name in names for names in known)}
     head = "".join(f"#define {name} {value}\n" for name, value in defines if name in named)
     return FlatText(head + text, SourceMap(flattener.texts, frozenset(user)))
 
@@ -135,38 +136,84 @@ class _Flattener:
             return
         self.texts[shown] = text
         self.lines.append(f'#line 1 "{shown}"')
-        included = False
-        for number, line in enumerate(text.splitlines(), start=1):
-            include = _INCLUDE.match(line)
-            if include is None:
-                self.lines.append(line)
-                if included and _ENDIF.match(line):
-                    # Where the condition was false, the compiler has not seen the directive behind the include.
-                    self.lines.append(f'#line {number + 1} "{shown}"')
-                    included = False
-                continue
-            included = True
-            place = Where(file=shown, line=number)
-            if include["name"] is None:
-                raise KernelBuildError(
-                    f'only #include "..." is possible, got {include["other"].strip()!r}', place
-                )
-            self.add(include["name"], place, beside=shown)
-            self.lines.append(f'#line {number + 1} "{shown}"')
+        for piece in _read(shown, text).pieces:
+            self.lines += piece.lines
+            if piece.line:
+                self._include(piece, Where(file=shown, line=piece.line), shown)
+                self.lines.append(f'#line {piece.line + 1} "{shown}"')
+
+    def _include(self, piece: _Piece, place: Where, beside: str) -> None:
+        if piece.include is None:
+            raise KernelBuildError(f'only #include "..." is possible, got {piece.other!r}', place)
+        self.add(piece.include, place, beside)
 
     def _find(self, name: str, where: Where, beside: str) -> tuple[str, str]:
         if name in self.generated:
             return f"generated/{name}", self.generated[name]
-        folders = [self.kernels]
-        if beside.startswith("kernels/"):
-            folders.insert(0, (self.kernels / beside.removeprefix("kernels/")).parent)
+        # (Files that travel with the program are read once.)
+        look = _found_once if self.kernels == folder("kernels") else _found
+        found = look(self.kernels, name, beside)
+        if found is not None:
+            return found
         root = self.kernels.resolve()
-        for candidate in ((base / name).resolve() for base in folders):
-            if candidate.is_relative_to(root) and candidate.is_file():
-                return f"kernels/{candidate.relative_to(root).as_posix()}", candidate.read_text(
-                    encoding="utf-8"
-                )
         there = [path.relative_to(root).as_posix() for path in root.rglob("*.[ch]*")] + list(self.generated)
         guess = nearest(name, there)
         hint = f"; did you mean {guess!r}?" if guess else ""
         raise KernelBuildError(f"there is no kernel file {name!r}{hint}", where)
+
+
+def _found(kernels: Path, name: str, beside: str) -> tuple[str, str] | None:
+    """The name and the text of a file of the kernels' folder that is included beside another; None if there is none."""
+    folders = [kernels]
+    if beside.startswith("kernels/"):
+        folders.insert(0, (kernels / beside.removeprefix("kernels/")).parent)
+    root = kernels.resolve()
+    for candidate in ((base / name).resolve() for base in folders):
+        if candidate.is_relative_to(root) and candidate.is_file():
+            shown = f"kernels/{candidate.relative_to(root).as_posix()}"
+            return shown, candidate.read_text(encoding="utf-8")
+    return None
+
+
+_found_once = lru_cache(maxsize=None)(_found)
+
+
+@dataclass(frozen=True, slots=True)
+class _Piece:
+    """Lines of a text, and the include behind them, which is on the line `line` (from 1; 0: there is none)."""
+
+    lines: tuple[str, ...]
+    line: int
+    include: str | None = None
+    other: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class _Text:
+    """A text's pieces, and the names in it."""
+
+    pieces: tuple[_Piece, ...]
+    names: frozenset[str]
+
+
+@lru_cache(maxsize=512)
+def _read(shown: str, text: str) -> _Text:
+    """A text that messages call `shown`: most are a part of many programs."""
+    pieces: list[_Piece] = []
+    lines: list[str] = []
+    names: set[str] = set()
+    included = False
+    for number, line in enumerate(text.splitlines(), start=1):
+        include = _INCLUDE.match(line)
+        if include is None:
+            names.update(_NAME.findall(line))
+            lines.append(line)
+            if included and _ENDIF.match(line):
+                # Where the condition was false, the compiler has not seen the directive behind the include.
+                lines.append(f'#line {number + 1} "{shown}"')
+                included = False
+        else:
+            included = True
+            pieces.append(_Piece(tuple(lines), number, include["name"], (include["other"] or "").strip()))
+            lines = []
+    return _Text((*pieces, _Piece(tuple(lines), 0)), frozenset(names))

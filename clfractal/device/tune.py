@@ -6,7 +6,7 @@ Each lane count is tried in a child process of its own. A driver may abort on on
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -19,6 +19,7 @@ from clfractal.errors import (
     ClfractalError,
     DeviceError,
     FileError,
+    Stopped,
     UntriedError,
 )
 
@@ -27,7 +28,8 @@ PROBE = "clfractal.device.probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
 _VERSION = 7  # of the probes: older measurements no longer count
-_SECTION = "lanes"
+SECTION = "lanes"
+"""Of the cache: reports of trials."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,6 +50,7 @@ def lane_reports(
     lane_counts: Sequence[int] = LANE_COUNTS,
     *,
     on_start: Callable[[str], None] | None = None,
+    stopped: Callable[[], bool] | None = None,
 ) -> tuple[LaneReport, ...]:
     """A report for each lane count, tried if this device and driver were not tried before.
 
@@ -56,27 +59,63 @@ def lane_reports(
         precision: lanes are tried for each number type alone.
         lane_counts: some of LANE_COUNTS.
         on_start: told, once, that a measurement of some seconds begins.
+        stopped: asked while a child process tries.
 
     Raises:
         DeviceError: status 2, the device has no float64.
         FileError: there is no room for what the driver writes.
+        Stopped: `stopped` answered True.
     """
     if precision == "float64" and not has_float64(device.info):
         raise DeviceError(f"{device.info.name} has no float64", status=STATUS_BAD_INPUT)
-    remembered = cache.recall(_SECTION)
+    known = cache.recall(SECTION)
     reports = []
     for lanes in lane_counts:
-        key = " | ".join((device.info.key, precision, str(lanes), PROBE, str(_VERSION)))
-        report = _from_data(remembered.get(key))
+        report = remembered(known, device, precision, lanes)
         if report is None:
             if on_start is not None:
                 on_start(f"measuring {device.info.name}, once")
                 on_start = None
-            report, is_known = _try(device, precision, lanes)
+            report, is_known = _try(device, precision, lanes, stopped)
             if is_known:
-                cache.remember(_SECTION, key, asdict(report))
+                cache.remember(SECTION, _name(device, precision, lanes), asdict(report))
         reports.append(report)
     return tuple(reports)
+
+
+def remembered(
+    known: Mapping[str, Any], device: Device, precision: Precision, lanes: int
+) -> LaneReport | None:
+    """The report of a lane count among facts of the cache; None if it was not tried yet, or by another version."""
+    return _from_data(known.get(_name(device, precision, lanes)))
+
+
+def first_lanes(
+    device: Device, precision: Precision, *, on_start: Callable[[str], None] | None = None
+) -> int:
+    """A lane count that works, and is probably fast: of those that are promising the one that fits the registers best.
+
+    It is tried if this device and driver were not tried before, which takes about a second.
+
+    Raises:
+        DeviceError: as `lane_reports`; status 3 if no lane count works.
+        FileError: as `lane_reports`.
+    """
+    fitting = device.cl_device.native_vector_width_float
+    faults: list[str] = []
+    for lane_counts in promising(device):
+        for lanes in sorted(lane_counts, key=lambda count: abs(count - fitting)):
+            (report,) = lane_reports(device, precision, (lanes,), on_start=on_start)
+            if report.accepted:
+                return lanes
+            faults.append(f"{lanes} lanes: {report.fault}")
+    raise none_works(device, faults)
+
+
+def none_works(device: Device, faults: Sequence[str]) -> DeviceError:
+    """What is to be said of a device on which each lane count has a fault."""
+    name = device.info.name
+    return DeviceError(f"{name}: no kernel works on this device: {faults[0]}", details="\n".join(faults))
 
 
 def accepted_lanes(device: Device, precision: Precision) -> tuple[int, ...]:
@@ -107,7 +146,9 @@ def is_of_the_device(error: ClfractalError) -> bool:
     return error.status == STATUS_DEVICE_FAILED and not isinstance(error, UntriedError)
 
 
-def _try(device: Device, precision: Precision, lanes: int) -> tuple[LaneReport, bool]:
+def _try(
+    device: Device, precision: Precision, lanes: int, stopped: Callable[[], bool] | None
+) -> tuple[LaneReport, bool]:
     """The report, and whether it may be remembered."""
     try:
         with activity.doing(f"measuring {device.info.name}"):
@@ -117,12 +158,18 @@ def _try(device: Device, precision: Precision, lanes: int) -> tuple[LaneReport, 
                 {"lanes": lanes, "precision": precision},
                 doing=f"trying {lanes} lanes",
                 timeout_s=PROBE_TIMEOUT_S,
+                stopped=stopped,
             )
-    except FileError:
+    except (FileError, Stopped):
         raise
     except ClfractalError as error:
         return LaneReport(lanes, error.message), is_of_the_device(error)
     return LaneReport(lanes, str(answer["fault"])), True
+
+
+def _name(device: Device, precision: Precision, lanes: int) -> str:
+    """What a trial is remembered under."""
+    return " | ".join((device.info.key, precision, str(lanes), PROBE, str(_VERSION)))
 
 
 def _from_data(data: Any) -> LaneReport | None:

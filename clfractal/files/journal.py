@@ -281,6 +281,19 @@ class Journal:
             self._notes[int(about.pop("number"))] = about
 
 
+def identity_of(path: Path) -> dict[str, Any] | None:
+    """What an earlier journal is of; None if there is none, or it cannot be told."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(_HEAD.size)
+            magic, length, check = _HEAD.unpack(head)
+            text = file.read(length) if magic == MAGIC and length <= _LARGEST_IDENTITY else b""
+        found = json.loads(text) if zlib.crc32(text) == check else None
+    except (OSError, ValueError, RecursionError, struct.error):
+        return None
+    return found if isinstance(found, dict) else None
+
+
 def _open_locked(path: Path) -> int:
     """Opens a file that may be a journal, and locks it against other processes.
 

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.threads import in_threads
 from clfractal.scene.lighting import Environment
 
 if TYPE_CHECKING:
@@ -32,7 +33,7 @@ COLUMNS, ROWS = 1024, 512
 
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, item 3.2
 _LEAST = 1e-6  # of the mean brightness, wherever there is light: no cell is too rare for float32
-_PIXELS_AT_ONCE = 1 << 21
+_PIXELS_AT_ONCE = 1 << 16
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
@@ -81,17 +82,16 @@ def pack_environment(pixels: Floats, sun: Sun | None = None) -> PackedEnvironmen
     else:  # all black: whatever is chosen has no light
         density = np.full((rows, columns), 1 / (4 * math.pi))
         shares = np.broadcast_to(areas[:, None], (rows, columns))
-    by_column = np.stack([_cumulative(row) for row in shares])
-    by_row = _cumulative(shares.sum(axis=1))
+    by_column, by_row = _cumulative(shares), _cumulative(shares.sum(axis=1))
     parts = [borders, by_row, by_column, density, pixels]
     around = np.cos(np.linspace(0.0, math.pi, height + 1))
-    of_rows = (pixels @ _LUMINANCE).mean(axis=1, dtype=np.float64)
+    of_rows = np.einsum("rck,k->r", pixels, _LUMINANCE / width)
     mean = float(of_rows @ (around[:-1] - around[1:]) / 2)
     if sun is not None:
         of_sun = float(_LUMINANCE @ sun.irradiance) / (4 * math.pi)
         parts.append(_sun_numbers(sun, of_sun / max(mean + of_sun, 1e-30)))
         mean += of_sun
-    data = np.concatenate([np.asarray(part, np.float32).reshape(-1) for part in parts])
+    data = np.concatenate([np.asarray(part).reshape(-1) for part in parts], dtype=np.float32)
     return PackedEnvironment(data, width, height, columns, rows, mean)
 
 
@@ -119,9 +119,11 @@ def material_fields(environment: Environment | None, packed: PackedEnvironment |
 
 
 def _cumulative(shares: Doubles) -> Doubles:
-    """Sums from 0 to exactly 1; equal steps where there is nothing to share."""
-    sums = np.concatenate([[0.0], np.cumsum(shares)])
-    return sums / sums[-1] if sums[-1] > 0 else np.linspace(0.0, 1.0, len(sums))
+    """Sums along the last axis from 0 to exactly 1; equal steps where there is nothing to share."""
+    sums = np.zeros((*shares.shape[:-1], shares.shape[-1] + 1))
+    np.cumsum(shares, axis=-1, out=sums[..., 1:])
+    total = sums[..., -1:]
+    return np.where(total > 0, sums / np.where(total > 0, total, 1.0), np.linspace(0.0, 1.0, sums.shape[-1]))
 
 
 def _brightness(pixels: Floats, columns: int, rows: int) -> Doubles:
@@ -130,33 +132,54 @@ def _brightness(pixels: Floats, columns: int, rows: int) -> Doubles:
     means = np.empty((height, columns))
     maxima = np.empty((height, columns))
     band = max(1, _PIXELS_AT_ONCE // width)
-    for first in range(0, height, band):
-        luminance = pixels[first : first + band] @ _LUMINANCE
+
+    def reduce(first: int) -> None:
+        some = slice(first, first + band)
+        luminance = np.einsum("rck,k->rc", pixels[some], _LUMINANCE)
         around = np.concatenate([luminance[:, -1:], luminance, luminance[:, :1]], axis=1)
-        means[first : first + band], maxima[first : first + band] = _reduce(around, columns)
+        means[some], maxima[some] = _means(around, columns), _maxima(around, columns)
+
+    in_threads(reduce, range(0, height, band))
     # A bound is enough: the largest of the sums is at most the sum of the largest.
-    mean = _reduce(np.concatenate([means[:1], means, means[-1:]]).T, rows)[0].T
-    maximum = _reduce(np.concatenate([maxima[:1], maxima, maxima[-1:]]).T, rows)[1].T
+    mean, maximum = in_threads(
+        lambda part: (
+            part[0](np.ascontiguousarray(np.concatenate([part[1][:1], part[1], part[1][-1:]]).T), rows).T
+        ),
+        [(_means, means), (_maxima, maxima)],
+    )
     brightness: Doubles = np.sqrt(mean * maximum)
     return np.where(maximum > 0, np.maximum(brightness, _LEAST * brightness.mean()), 0.0)
 
 
-def _reduce(values: Doubles, cells: int) -> tuple[Doubles, Doubles]:
-    """Mean and maximum, in each of `cells` equal parts of a row, of straight lines between pixels' middles.
+def _means(values: Doubles, cells: int) -> Doubles:
+    """Means, in each of `cells` equal parts of a row, of straight lines between pixels' middles.
 
     `values` has the pixels of a row, and one more at either end, along its last axis.
     """
+    left, part, start, step = _borders(values, cells)
+    # Exact integrals of the lines: whole ones by sums, and what is left of the last.
+    whole = np.zeros_like(values)
+    np.cumsum((values[..., :-1] + values[..., 1:]) / 2, axis=-1, out=whole[..., 1:])
+    integral = whole[..., left] + part * (start + 0.5 * part * step)
+    found: Doubles = np.maximum(np.diff(integral, axis=-1), 0.0) * (cells / (values.shape[-1] - 2))
+    return found
+
+
+def _maxima(values: Doubles, cells: int) -> Doubles:
+    """Maxima of the same."""
+    left, part, start, step = _borders(values, cells)
+    at_borders = start + part * step
+    # Every cell holds the middle of a pixel, since there are no more cells than pixels.
+    first = left[:-1] + (part[:-1] > 0)
+    inside = np.maximum.reduceat(values[..., :-1], first, axis=-1)
+    found: Doubles = np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:]))
+    return found
+
+
+def _borders(values: Doubles, cells: int) -> tuple[npt.NDArray[np.int64], Doubles, Doubles, Doubles]:
+    """Where parts of a row begin and end: after which value, how far, that value, and the step to the next one."""
     count = values.shape[-1] - 2
     borders = np.arange(cells + 1) * (count / cells) + 0.5  # the middle of values[i] lies at i
-    left = np.minimum(np.floor(borders).astype(int), count)
-    part = borders - left
-    start, step = values[..., left], values[..., left + 1] - values[..., left]
-    at_borders = start + part * step
-    # Exact integrals of the lines: whole ones by sums, and what is left of the last.
-    whole = np.cumsum((values[..., :-1] + values[..., 1:]) / 2, axis=-1)
-    whole = np.concatenate([np.zeros((*values.shape[:-1], 1)), whole], axis=-1)
-    integral = whole[..., left] + part * (start + 0.5 * part * step)
-    mean = np.maximum(np.diff(integral, axis=-1), 0.0) * (cells / count)
-    # Every cell holds the middle of a pixel, since there are no more cells than pixels.
-    inside = np.maximum.reduceat(values[..., : count + 1], np.ceil(borders[:-1]).astype(int), axis=-1)
-    return mean, np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:]))
+    left = np.minimum(np.floor(borders).astype(np.int64), count)
+    start = values[..., left]
+    return left, borders - left, start, values[..., left + 1] - start

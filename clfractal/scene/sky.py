@@ -10,6 +10,7 @@ turbidity 3 has a luminance of 1, and middle grey comes out at 0.18.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
 from typing import TYPE_CHECKING
@@ -17,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.threads import in_threads
 from clfractal.scene.atmosphere import (
     EARTH,
     WAVELENGTHS,
@@ -38,42 +40,40 @@ SUNLIGHT = 4.973
 EYE = EARTH + 0.05
 """Where the sky is seen from: 50 m above the ground, so that the horizon lies 0.2 degrees below the level."""
 _ROWS, _AZIMUTHS = 96, 49
+_ROWS_AT_ONCE = 16
 
 Floats = npt.NDArray[np.float32]
-_Parts = tuple[Doubles, Doubles, Doubles]
 
 
 @lru_cache(maxsize=4)
 def bake(sky: Sky) -> Floats:
     """The map of a sky, shape (HEIGHT, WIDTH, 3): linear Rec. 709, finite, none below 0; not to be written to."""
-    air = Atmosphere(sky.turbidity)
     elevation = np.radians(sky.sun_elevation)
+    air = Atmosphere(sky.turbidity, elevation)
     sun = np.array(np.sin(elevation))
     dip = -np.arccos(EARTH / EYE)
     rows: Doubles = pi / 2 - (np.arange(HEIGHT, dtype=np.float64) + 0.5) * (pi / HEIGHT)
     above = int((rows > dip).sum())
     azimuth: Doubles = np.radians(((np.arange(WIDTH) + 0.5) / WIDTH - 0.5) * 360 - sky.sun_azimuth)
-    pixels = np.empty((HEIGHT, WIDTH, 3))
-    pixels[:above] = _light(air, sun, rows[:above], azimuth, (dip + 1e-6, pi / 2))
-    pixels[above:] = _light(air, sun, rows[above:], azimuth, (dip - 1e-6, -pi / 2))
     radius = np.array(EARTH)
     direct = to_rgb(air.transmittance(radius, sun)) * sun_visible(radius, sun) * max(float(sun), 0.0)
-    irradiance = np.maximum(direct + _irradiance(pixels[:above], rows[:above]), 0)
+    found = np.empty((HEIGHT, WIDTH, 3), np.float32)
+    _show(found[:above], _Parts.of(air, sun, rows[:above], (dip + 1e-6, pi / 2)), azimuth)
+    irradiance = np.maximum(direct + _irradiance(found[:above], rows[:above]), 0)
     end = np.linspace(0, 1, _ROWS) ** 2 * (-pi / 2 - dip) + dip - 1e-6
-    through = to_rgb(air.scattered(EYE, np.sin(end), np.zeros(1), sun).through) / to_rgb(
+    through = to_rgb(air.scattered(EYE, np.sin(end), np.zeros(1), sun, whole=False).through) / to_rgb(
         np.ones_like(WAVELENGTHS)
     )
     seen = _between(through, np.sqrt((rows[above:] - dip) / (-pi / 2 - dip)) * (_ROWS - 1))
-    pixels[above:] += (seen * irradiance * sky.ground_color / pi)[:, None]
-    np.maximum(pixels, 0.0, out=pixels)
-    found = pixels.astype(np.float32)
+    ground = seen * irradiance * sky.ground_color / pi
+    _show(found[above:], _Parts.of(air, sun, rows[above:], (dip - 1e-6, -pi / 2)), azimuth, ground)
     found.flags.writeable = False
     return found
 
 
 def to_rgb(spectrum: Doubles) -> Doubles:
     """Linear Rec. 709 of what is left of sunlight, shape (..., wavelengths); all of it has the luminance `SUNLIGHT`."""
-    found: Doubles = spectrum @ _spectrum_to_rgb()
+    found: Doubles = np.einsum("...w,wk->...k", spectrum, _spectrum_to_rgb())
     return found
 
 
@@ -104,31 +104,59 @@ def _spectrum_to_rgb() -> Doubles:
     return found
 
 
-def _light(
-    air: Atmosphere, sun: Doubles, rows: Doubles, azimuth: Doubles, ends: tuple[float, float]
-) -> Doubles:
-    """Scattered light at elevations `rows` between `ends`, the first of which is the horizon: (rows, azimuths, 3).
+@dataclass(frozen=True, slots=True)
+class _Parts:
+    """Scattered light without its phases, at some elevations: by molecules, by aerosol, and many times.
 
-    The integrals change slowly and are blended from a grid that is fine near the horizon; the phase functions, which
-    do not, are exact at each pixel.
+    Attributes:
+        light: shape (rows, 9, _AZIMUTHS): three colours of each part, at angles around the sun.
+        rows: the elevations.
+        sun: mu of the sun.
     """
-    around = np.linspace(0, pi, _AZIMUTHS)
-    grid = ends[0] + np.linspace(0, 1, _ROWS) ** 2 * (ends[1] - ends[0])
-    found = [air.scattered(EYE, np.sin(row)[None], around, sun) for row in grid]
-    parts: _Parts = (
-        to_rgb(np.stack([row.molecules for row in found])),
-        to_rgb(np.stack([row.aerosol for row in found])),
-        to_rgb(np.stack([row.many for row in found])),
-    )
-    place = np.sqrt(np.clip((rows - ends[0]) / (ends[1] - ends[0]), 0, 1)) * (_ROWS - 1)
+
+    light: Floats
+    rows: Doubles
+    sun: float
+
+    @classmethod
+    def of(cls, air: Atmosphere, sun: Doubles, rows: Doubles, ends: tuple[float, float]) -> _Parts:
+        """At elevations `rows` between `ends`, the horizon first: blended from a grid that is fine there."""
+        around = np.linspace(0, pi, _AZIMUTHS)
+        grid = ends[0] + np.linspace(0, 1, _ROWS) ** 2 * (ends[1] - ends[0])
+        found = in_threads(lambda row: air.scattered(EYE, np.sin(row)[None], around, sun), [*grid])
+        place = np.sqrt(np.clip((rows - ends[0]) / (ends[1] - ends[0]), 0, 1)) * (_ROWS - 1)
+        parts = [
+            to_rgb(np.stack(part))
+            for part in zip(*((each.molecules, each.aerosol, each.many) for each in found), strict=True)
+        ]
+        light = _between(np.concatenate(parts, axis=-1), place).swapaxes(1, 2)
+        return cls(np.ascontiguousarray(light, np.float32), rows, float(sun))
+
+
+def _show(pixels: Floats, parts: _Parts, azimuth: Doubles, more: Doubles | None = None) -> None:
+    """Writes the light of rows, at angles from the sun's, and what each row has besides, shape (rows, 3).
+
+    The integrals change slowly, and are blended; the phase functions, which do not, are exact at each pixel.
+    """
     from_sun = np.arccos(np.clip(np.cos(azimuth), -1, 1)) / pi * (_AZIMUTHS - 1)
-    cosine = np.sin(rows)[:, None] * sun + np.cos(rows)[:, None] * np.sqrt(1 - sun**2) * np.cos(azimuth)
-    light = np.zeros((len(rows), len(azimuth), 3))
-    phases = (rayleigh_phase(cosine), aerosol_phase(cosine), np.ones_like(cosine))
-    for part, phase in zip(parts, phases, strict=True):
-        at_rows = _between(part, place)
-        light += _between(at_rows.swapaxes(0, 1), from_sun).swapaxes(0, 1) * phase[..., None]
-    return light
+    first = np.minimum(from_sun.astype(int), _AZIMUTHS - 2)
+    part = (from_sun - first).astype(np.float32)
+    level = np.sqrt(1 - parts.sun**2) * np.cos(azimuth)
+
+    def show(row: int) -> None:
+        some = slice(row, row + _ROWS_AT_ONCE)
+        rows = parts.rows[some, None]
+        cosine = (np.sin(rows) * parts.sun + np.cos(rows) * level).astype(np.float32)[:, None]
+        light = np.take(parts.light[some], first, axis=2) * (1 - part)
+        light += np.take(parts.light[some], first + 1, axis=2) * part
+        molecules, aerosol, shown = light[:, :3], light[:, 3:6], light[:, 6:]
+        shown += np.multiply(molecules, rayleigh_phase(cosine), out=molecules)
+        shown += np.multiply(aerosol, aerosol_phase(cosine), out=aerosol)
+        if more is not None:
+            shown += more[some, :, None].astype(np.float32)
+        np.maximum(shown.swapaxes(1, 2), 0, out=pixels[some])
+
+    in_threads(show, range(0, len(parts.rows), _ROWS_AT_ONCE))
 
 
 def _between(values: Doubles, place: Doubles) -> Doubles:
@@ -139,8 +167,8 @@ def _between(values: Doubles, place: Doubles) -> Doubles:
     return found
 
 
-def _irradiance(pixels: Doubles, rows: Doubles) -> Doubles:
+def _irradiance(pixels: Floats, rows: Doubles) -> Doubles:
     """Of a level surface under the rows from the top, shape (3,)."""
     weights = pixel_areas()[: len(rows)] * np.maximum(np.sin(rows), 0)
-    found: Doubles = np.einsum("r,rck->k", weights, np.maximum(pixels, 0))
+    found: Doubles = weights @ pixels.sum(axis=1, dtype=np.float64)
     return found

@@ -22,6 +22,7 @@ from clfractal.viewer.controls import Controls
 from clfractal.viewer.deeds import Deeds
 from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.inputs import Inputs
+from clfractal.viewer.measuring import Measuring
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.outputs import Outputs
 from clfractal.viewer.own_screen import OwnScreen
@@ -103,7 +104,7 @@ class Viewer:
         self.places: Places = places_of(scene.stereo, self.window.framebuffer)
         self.pick: Pick | None = None
         self.finished = False
-        self._hidden = False
+        self._hidden, self._measuring = False, Measuring(options)
         self._told: Any = None
         self._failed: set[str] = set()
         self._redraw = _REDRAWN
@@ -269,6 +270,7 @@ class Viewer:
         self._mind_device()
         self.studio.films.look(now)
         self.studio.tick()
+        self._measuring.look(self.studio, now)
         session = self.studio.session
         told = (session.problem, session.progress, session.paused, self.studio.messages[-1:])
         if told != self._told:

@@ -77,15 +77,20 @@ class AnyEngine(ABC):
         region: tuple[int, int, int, int] | None = None,
         channels: Sequence[str] | None = None,
         quality: str | None = None,
+        pictures: int = 1,
     ) -> Job:
         """The job of a scene's picture: see `prepare.prepare`; what it leaves to be measured is measured first.
+
+        Args:
+            pictures: how many like it are to be made.
 
         Raises:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
             DeviceError, KernelBuildError: the quick look that this takes failed.
             FileError: the picture is to be denoised, and the package for it is not installed.
         """
-        asked = {"precision": precision, "samples": samples, "region": region, "channels": channels}
+        asked: dict[str, Any] = {"precision": precision, "samples": samples, "region": region}
+        asked |= {"channels": channels, "pictures": pictures}
         if size is not None:
             from clfractal.work.sized import with_size
 

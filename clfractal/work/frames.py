@@ -122,6 +122,7 @@ def frames(
                 size=size,
                 channels=channels,
                 quality=quality,
+                pictures=len(wanted),
             )
             with closing(films):
                 yield from zip(wanted, films, strict=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,8 +40,9 @@ class Precompilation:
 
     Args:
         device: where they are to run.
-        scenes: their scenes.
+        scenes: their scenes, read one by one.
         precision: a number type in the place of the scenes'.
+        read: called with the number of scenes that were read.
         on_start: told a line if the device is measured first.
 
     Raises:
@@ -55,14 +56,16 @@ class Precompilation:
         scenes: Iterable[Scene],
         *,
         precision: str | None = None,
+        read: Callable[[int], None] = lambda count: None,
         on_start: Callable[[str], None] | None = None,
     ) -> None:
         self.device = device
         self._wanted: dict[tuple[str, tuple[str, ...]], Wanted] = {}
         self._volumes: list[Job] = []
         drawing, resources = Drawing(device, OutputBuffers(device)), Resources(device)
-        for scene in scenes:
-            job = prepare(scene, device, precision=precision, on_start=on_start)
+        for number, scene in enumerate(scenes):
+            read(number)
+            job = prepare(scene, device, precision=precision, measures=True, on_start=on_start)
             if any(isinstance(view.scene.renderer, VolumeRenderer) for view in job.views):
                 self._volumes.append(prepare(shown_scene(scene), device, precision=precision))
                 continue
@@ -155,6 +158,11 @@ class Precompilation:
 
     def _unkept(self) -> int:
         return sum(not self._is_kept(each) for each in self._wanted.values())
+
+
+def library_count(files: Collection[Path]) -> int:
+    """How many scenes `library_scenes` gives."""
+    return len(catalog.names()) + len(files)
 
 
 def library_scenes(files: Iterable[Path]) -> Iterator[Scene]:

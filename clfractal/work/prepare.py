@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import cast
 
 from clfractal import arguments
@@ -16,6 +17,7 @@ from clfractal.pictures.modes import picture_size
 from clfractal.pictures.tiles import Region
 from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
+from clfractal.renderers.records import bounces
 from clfractal.renderers.shutter import shutter_of
 from clfractal.scene.checks import check_layers
 from clfractal.scene.layout import Place
@@ -25,6 +27,9 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.job import Composition, Identity, Job, Paste, StereoPair
 
 MAX_SAMPLES = 65_536
+MEASURED_FIRST_SECONDS = 30.0
+"""A device that is not measured yet is measured before pictures that probably take so long, and not before others."""
+_SHOTS_A_SECOND = 1e6  # of a compute unit, about: half to twice as many by direct light
 PRECISIONS = ("auto", "float32", "float64")
 
 
@@ -36,6 +41,8 @@ def prepare(
     samples: int | None = None,
     region: tuple[int, int, int, int] | None = None,
     channels: Sequence[str] | None = None,
+    pictures: int = 1,
+    measures: bool | None = None,
     on_start: Callable[[str], None] | None = None,
 ) -> Job:
     """The job of a scene's picture; arguments that are None take the value of the scene, or of each of its views.
@@ -45,7 +52,10 @@ def prepare(
 
     Args:
         region: x, y, width, height of the part of the finished picture to make, pixels.
-        on_start: called with a message if the device is measured first, which takes some seconds, once.
+        pictures: how many like it are to be made, as frames of a film.
+        measures: whether the device is measured before this picture, if it is not known yet; None: where that pays. It
+            takes some seconds, once.
+        on_start: called with a message if the device is measured or tried first.
 
     Raises:
         SceneError: the region is not inside the picture, an unknown precision or channel, a wrong number of
@@ -63,7 +73,7 @@ def prepare(
     if channels is not None:
         where = "channels"
         names = check_channels(arguments.words("channels", channels), Where(path=where))
-    chooser = _Chooser(device, precision, on_start)
+    chooser = _Chooser(device, precision)
     # One number type for both eyes, chosen for the view of the eye between them.
     chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]
     views: list[PlannedView] = []
@@ -75,10 +85,9 @@ def prepare(
             needed = _within(wanted, place)
             if needed is None:
                 continue
-            used, lanes = chosen[number]
             check_layers(view, names, where)
             shots = samples if samples is not None else view.renderer.samples
-            plan = Plan(used, lanes, shots, needed, _rendered(view, names))
+            plan = Plan(chosen[number], 1, shots, needed, _rendered(view, names))
             numbers.append(len(views))
             places.append(place)
             planned = PlannedView(view, plan, own_eye, number)
@@ -102,7 +111,55 @@ def prepare(
             if needed is not None
         }
         composition = StereoPair(stereo, eyes, image, whole)
-    return Job(scene, tuple(views), composition, names, device.info, chooser.remark)
+    if measures is None:
+        measures = pays_to_measure(views, device, pictures)
+    found = tuple(with_lanes(views, device, measures=measures, on_start=on_start))
+    return Job(scene, found, composition, names, device.info, chooser.remark)
+
+
+def with_lanes(
+    views: Sequence[PlannedView],
+    device: Device,
+    *,
+    measures: bool,
+    on_start: Callable[[str], None] | None = None,
+) -> list[PlannedView]:
+    """Views with the lanes of a device.
+
+    Raises:
+        DeviceError, FileError: as `best_lanes`.
+    """
+    lanes = lanes_of(views, device, measures=measures, on_start=on_start)
+    return [
+        replace(view, plan=replace(view.plan, lanes=count)) for view, count in zip(views, lanes, strict=True)
+    ]
+
+
+def lanes_of(
+    views: Sequence[PlannedView],
+    device: Device,
+    *,
+    measures: bool,
+    on_start: Callable[[str], None] | None = None,
+) -> tuple[int, ...]:
+    """The lanes that a device has for each view; arguments and errors as for `best_lanes`."""
+    return tuple(
+        best_lanes(
+            device, view.plan.precision, rule_of(view.scene.chain), measures=measures, on_start=on_start
+        )
+        for view in views
+    )
+
+
+def pays_to_measure(views: Sequence[PlannedView], device: Device, pictures: int = 1) -> bool:
+    """Whether a device that is not measured yet is measured before a job: the job probably takes much longer."""
+    shots = sum(
+        view.plan.region.pixels * view.plan.samples * (1 + bounces(view.scene))
+        for view in views
+        if isinstance(view.scene.renderer, SurfaceRenderer)
+    )
+    seconds = pictures * shots / (_SHOTS_A_SECOND * max(device.info.compute_units, 1))
+    return seconds >= MEASURED_FIRST_SECONDS
 
 
 def _rendered(view: Scene, names: tuple[str, ...]) -> tuple[str, ...]:
@@ -115,21 +172,20 @@ def _rendered(view: Scene, names: tuple[str, ...]) -> tuple[str, ...]:
 
 
 class _Chooser:
-    """Chooses number types and lanes for one device."""
+    """Chooses number types for one device."""
 
-    def __init__(self, device: Device, precision: str | None, on_start: Callable[[str], None] | None) -> None:
-        self.device, self.wanted, self.on_start = device, precision, on_start
+    def __init__(self, device: Device, precision: str | None) -> None:
+        self.device, self.wanted = device, precision
         self.remark = ""
 
-    def number_type(self, view: Scene, eye: Eye) -> tuple[Precision, int]:
+    def number_type(self, view: Scene, eye: Eye) -> Precision:
         wanted = self.wanted if self.wanted is not None else view.renderer.precision
         info = self.device.info
         used, remark = choose_precision(
             view, cast(PrecisionChoice, wanted), has_float64=has_float64(info), eye=eye
         )
         self.remark = self.remark or remark
-        lanes = best_lanes(self.device, used, rule_of(view.chain), on_start=self.on_start)
-        return used, lanes
+        return used
 
 
 def _within(region: Region, place: Place) -> Region | None:

@@ -17,10 +17,10 @@ from clfractal.device.select import SPEEDS, Device, DeviceInfo, has_float64
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.pictures.makers import Maker
 from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.work.hands import Hands
 from clfractal.work.job import Job, Kind
 from clfractal.work.local import LocalExecutor
+from clfractal.work.prepare import lanes_of, pays_to_measure
 from clfractal.work.run import Result, Tally, WorkItem
 from clfractal.work.sharing import Offer, Shared
 
@@ -143,11 +143,11 @@ class SeveralExecutor:
                 self._tell_once(f"{info.index} {info.name} has no float64, so others do its work")
                 continue
             try:
-                lanes = tuple(
-                    best_lanes(
-                        executor.device, view.plan.precision, rule_of(view.scene.chain), on_start=self.tell
-                    )
-                    for view in job.views
+                lanes = lanes_of(
+                    job.views,
+                    executor.device,
+                    measures=pays_to_measure(job.views, executor.device),
+                    on_start=self.tell,
                 )
             except DeviceError as error:
                 if error.status != STATUS_DEVICE_FAILED:

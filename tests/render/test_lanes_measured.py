@@ -15,8 +15,10 @@ from clfractal.device.select import Device, choose
 from clfractal.errors import DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.renderers import lanes
-from clfractal.renderers.lanes import best_lanes, march_reports, rule_of
+from clfractal.renderers.lanes import best_lanes, is_measured, march_reports, rule_of
 from clfractal.renderers.trial import RULES, Rule, march
+from clfractal.scene.load import load_scene
+from clfractal.work.prepare import prepare
 from tests.portability.lane_counts import accepted_in_use
 
 pytestmark = pytest.mark.conformance
@@ -30,6 +32,18 @@ def working_job(request: dict[str, Any]) -> dict[str, Any]:
 
 def failing_job(request: dict[str, Any]) -> dict[str, Any]:
     return {"fault": "nonsense"}
+
+
+def without_16(request: dict[str, Any]) -> dict[str, Any]:
+    return {"fault": "nonsense" if request["lanes"] == 16 else ""}
+
+
+def without_8(request: dict[str, Any]) -> dict[str, Any]:
+    return {"fault": "nonsense" if request["lanes"] == 8 else ""}
+
+
+def without_8_16(request: dict[str, Any]) -> dict[str, Any]:
+    return {"fault": "nonsense" if request["lanes"] > 4 else ""}
 
 
 def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
@@ -75,6 +89,35 @@ def test_a_measurement_is_remembered(device: Device, monkeypatch: pytest.MonkeyP
     lanes._reports.clear()  # in memory: now they come from the file
     assert march_reports(device, "float32") == first
     assert [report.lanes for report in first] == [16, 8]
+
+
+@pytest.mark.usefixtures("rigged")
+def test_a_first_picture_is_not_measured_for(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its lanes fit the registers, and were tried; a process keeps them, the next one has those that were measured."""
+    told: list[str] = []
+    with monkeypatch.context() as patch:
+        patch.setattr(lanes, "JOB", "never:called")
+        first = best_lanes(device, "float32", "jacobian", measures=False, on_start=told.append)
+        assert not is_measured(device, "float32")
+    wide = device.cl_device.native_vector_width_float
+    assert first == (16 if abs(16 - wide) < abs(8 - wide) else 8)
+    assert told == [f"measuring {device.info.name}, once"]
+    march_reports(device, "float32")
+    assert is_measured(device, "float32")
+    assert best_lanes(device, "float32", "jacobian") == first
+    lanes._in_use.clear()
+    lanes._reports.clear()
+    assert is_measured(device, "float32")
+    assert best_lanes(device, "float32", "jacobian", measures=False) == 8
+
+
+@pytest.mark.usefixtures("rigged")
+@pytest.mark.parametrize(("broken", "expected"), [((16,), 8), ((8,), 16), ((8, 16), 4)])
+def test_what_computes_wrongly_is_no_guess(
+    device: Device, monkeypatch: pytest.MonkeyPatch, broken: tuple[int, ...], expected: int
+) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:{'_'.join(['without', *map(str, broken)])}")
+    assert best_lanes(device, "float32", measures=False) == expected
 
 
 @pytest.mark.usefixtures("rigged")
@@ -140,3 +183,19 @@ def test_what_is_marched_is_the_object(device: Device, rule: Rule) -> None:
     for found in met.values():
         assert ((found[..., 0] > 0) == hit).mean() > 0.99
         assert np.median(np.abs(found[..., 0] - wanted[..., 0])[hit]) < 1e-4
+
+
+@pytest.mark.usefixtures("rigged")
+@pytest.mark.parametrize(
+    ("samples", "pictures", "waits"), [(1, 1, False), (65536, 1, True), (16, 100000, True)]
+)
+def test_long_work_waits_for_the_measurement(
+    device: Device, samples: int, pictures: int, waits: bool
+) -> None:
+    """Of a film all frames count."""
+    scene = load_scene(
+        {"version": 1, "formula": {"name": "hast"}, "camera": {}, "image": {"width": 256, "height": 256}}
+    )
+    job = prepare(scene, device, precision="float32", samples=samples, pictures=pictures)
+    assert is_measured(device, "float32") == waits
+    assert job.lanes == (8 if waits else tune.first_lanes(device, "float32"))

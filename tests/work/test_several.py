@@ -195,7 +195,7 @@ def test_devices_of_another_kind_use_their_own_lanes(device: Device, monkeypatch
     halves_of(device)
     parts = device.divided((1, 1))
     other = Device(replace(parts[1].info, driver="of another version"), parts[1].cl_device)
-    monkeypatch.setattr(several, "best_lanes", lambda chosen, *rest, **more: 4)
+    monkeypatch.setattr(several, "lanes_of", lambda views, chosen, **more: (4,) * len(views))
     with Engine([parts[0], other]) as engine:
         job = engine.prepare(SCENE)
     assert job.on(parts[0].info) is job
