@@ -117,8 +117,7 @@ def _flatten(
     flattener.add(entry, Where())
     text = "\n".join(flattener.lines) + "\n"
     # What a text never names makes no other program of it.
-    known = [_read(*each).names for each in flattener.texts.items()]
-    named = {name for name, _ in defines if any(name in names for names in known)}
+    named = frozenset().union(*(_read(*each).names for each in flattener.texts.items()))
     head = "".join(f"#define {name} {value}\n" for name, value in defines if name in named)
     return FlatText(head + text, SourceMap(flattener.texts, frozenset(user)))
 
@@ -126,6 +125,7 @@ def _flatten(
 class _Flattener:
     def __init__(self, kernels: Path, generated: dict[str, str]) -> None:
         self.kernels = kernels
+        self.shipped = kernels == folder("kernels")
         self.generated = generated
         self.lines: list[str] = []
         self.texts: dict[str, str] = {}
@@ -151,8 +151,7 @@ class _Flattener:
         if name in self.generated:
             return f"generated/{name}", self.generated[name]
         # (Files that travel with the program are read once.)
-        look = _found_once if self.kernels == folder("kernels") else _found
-        found = look(self.kernels, name, beside)
+        found = (_found_once if self.shipped else _found)(self.kernels, name, beside)
         if found is not None:
             return found
         root = self.kernels.resolve()
