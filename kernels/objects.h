@@ -33,28 +33,31 @@ INLINE real object_met(int i, vec origin, vec direction, object_record objects, 
     return span_first(s);
 }
 
-// The nearest object that a ray meets before its `far`: how far it is, or the largest number; and its number from 1, or 0.
-CALLED real objects_met(const ray *r, object_record objects, plane_set planes, int count, __global const float *tables,
-                        real *number) {
-    real nearest = (real)(REAL_LARGEST);
+// Takes what a ray meets of an object, if that is the nearest so far.
+INLINE void nearer_met(real t, int i, const ray *r, real *nearest, real *number) {
+    const mask here = less(t, *nearest) & less(t, r->far);
+    *nearest = pick(here, t, *nearest);
+    *number = pick(here, (real)((scalar)(i + 1)), *number);
+}
+
+// The nearest object that a ray meets before its `far`: how far it is, or the largest number; and its number from 1, or 0. (One loop a
+// turn: in one loop for all they would hold each other's registers.)
+CALLED real objects_met(const ray *r, object_record objects, plane_set planes, int count, __global const float *tables, real *number) {
+    real nearest = (real)(REAL_LARGEST), face;
     *number = R(0.0);
-    for (int turn = 0; turn < 3; ++turn) {
-        for (int i = 0; i < count; ++i) {
-            object_record o = objects + i;
-            if (turn_to_meet(o) != turn) continue;
-            real t, face;
-            if (turn == 0) {
-                t = object_met(i, r->origin, r->direction, objects, planes, &face);
-            } else if (turn == 1) {
-                const vec from = object_own(o, vec_sub(r->origin, vec_splat(o->middle)));
-                t = water_met(o, from, object_own(o, r->direction), fmin(nearest, r->far), r->footprint, r->spread);
-            } else {
-                t = level_met(o, tables, r->origin, r->direction, fmin(nearest, r->far));
-            }
-            const mask here = less(t, nearest) & less(t, r->far);
-            nearest = pick(here, t, nearest);
-            *number = pick(here, (real)((scalar)(i + 1)), *number);
-        }
+    for (int i = 0; i < count; ++i) {
+        if (turn_to_meet(objects + i) != 0) continue;
+        nearer_met(object_met(i, r->origin, r->direction, objects, planes, &face), i, r, &nearest, number);
+    }
+    for (int i = 0; i < count; ++i) {
+        if (turn_to_meet(objects + i) != 1) continue;
+        const vec from = object_own(objects + i, vec_sub(r->origin, vec_splat(objects[i].middle)));
+        const vec way = object_own(objects + i, r->direction);
+        nearer_met(water_met(objects + i, from, way, fmin(nearest, r->far), r->footprint, r->spread), i, r, &nearest, number);
+    }
+    for (int i = 0; i < count; ++i) {
+        if (turn_to_meet(objects + i) != 2) continue;
+        nearer_met(level_met(objects + i, tables, r->origin, r->direction, fmin(nearest, r->far)), i, r, &nearest, number);
     }
     return nearest;
 }
