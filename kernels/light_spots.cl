@@ -23,11 +23,8 @@ STAGE(light_spots) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
         if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
-        if (KEEPS(s, STATE_GATHERED)) {
-            STATE_RECALL(s, gathered, STATE_GATHERED);
-        } else {
-            gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
-        }
+        if (KEEPS(s, STATE_GATHERED)) STATE_RECALL(s, gathered, STATE_GATHERED);
+        else gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
         gathered = color_pick(on_face(&found), found.tint, gathered);
     }
     if (bounce == 0 && KEEPS(s, STATE_GLANCE)) {
