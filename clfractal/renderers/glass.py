@@ -21,6 +21,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.threads import in_threads
 from clfractal.renderers.scattering import (
     COSINES,
     REFLECTANCES,
@@ -54,7 +55,8 @@ def glass_tables() -> Floats:
 def glass_albedos() -> Doubles:
     """What is reflected and refracted at once, shape (2, REFLECTANCES, ROUGHNESSES, COSINES + 1): outside, inside."""
     table = np.empty((2, REFLECTANCES, ROUGHNESSES, COSINES + 1))
-    for k in range(ROUGHNESSES):
+
+    def fill(k: int) -> None:
         alpha = max((k / (ROUGHNESSES - 1)) ** 2, 1 / SMOOTHEST_PARTS)
         cosine, facet, meeting = visible_normals(table_cosines(), alpha)
         reflected = mirrored(cosine, facet, meeting, alpha)
@@ -65,6 +67,8 @@ def glass_albedos() -> Doubles:
                 share = fresnel_across(meeting, across)
                 passed = _refracted(cosine, facet, meeting, across, alpha)
                 table[side, j, k, :-1] = (share * reflected + (1 - share) * passed).mean(axis=(1, 2))
+
+    in_threads(fill, range(ROUGHNESSES))
     table[..., -1] = mean_albedo(table[..., :-1])
     return np.minimum(table, 1.0)
 

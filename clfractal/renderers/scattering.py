@@ -22,6 +22,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.device.threads import in_threads
 from clfractal.renderers.facets import repeated_tables
 
 COSINES, ROUGHNESSES, REFLECTANCES = 32, 16, 16
@@ -42,7 +43,8 @@ def albedo_tables() -> Floats:
     fuzz = np.empty((ROUGHNESSES, width))
     dielectric = np.empty((REFLECTANCES, ROUGHNESSES, width))
     cosines = table_cosines()
-    for k in range(ROUGHNESSES):
+
+    def fill(k: int) -> None:
         roughness = k / (ROUGHNESSES - 1)
         alpha = max(roughness * roughness, 1 / SMOOTHEST_PARTS)
         cosine, facet, meeting = visible_normals(cosines, alpha)
@@ -51,6 +53,8 @@ def albedo_tables() -> Floats:
             root = j / REFLECTANCES
             dielectric[j, k, :-1] = (weight * fresnel(meeting, (1 + root) / (1 - root))).mean(axis=(1, 2))
         fuzz[k, :-1] = _fuzz_albedo(cosines, roughness)
+
+    in_threads(fill, range(ROUGHNESSES))
     for table in (fuzz, dielectric):
         table[..., -1] = mean_albedo(table[..., :-1])
     albedos = [np.minimum(part, 1.0).reshape(-1) for part in (fuzz, dielectric)]
