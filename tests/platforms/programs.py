@@ -142,9 +142,9 @@ def _joined_recipes(count: int, precision: Precision) -> Iterator[programs.Recip
         assert isinstance(scene.renderer, VolumeRenderer)
         body = Body.of(scene)
         yield programs.fill_recipe(body, scene.renderer, count, precision)
-        yield programs.normals_recipe(body, count, precision)
         if name == "filled":
             yield programs.nodes_recipe(body, count, precision)
+            yield programs.normals_recipe(body, count, precision)
 
 
 def _choices(defines: Mapping[str, object]) -> str:
