@@ -45,8 +45,16 @@ def numbered(text: str, number: int) -> str:
     JOINED stays as it is: all formulas of a batch stand alone, and headers that they share read it.
     """
     names = {name for found in _DEFINED.findall(text) for name in found if name} - {"JOINED"}
+    for listed in re.findall(r"^enum \{([^}]*)\};", text, re.MULTILINE):
+        names |= set(re.findall(r"\w+", listed))
     pattern = rf"(?<!->)\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
-    return re.sub(pattern, rf"\1_f{number}", text)
+    picked = re.findall(r"^NUMBERS_PICKED\((\w+)\)", text, re.MULTILINE)
+    text = re.sub(pattern, rf"\1_f{number}", text)
+    # Names that macros put together: those of a shape's functions, and of what picks one of two structs.
+    text = re.sub(r"\b(name##_\w+)", rf"\1_f{number}", text)
+    for struct in picked:
+        text = re.sub(rf"\b{struct}_pick\b", f"{struct}_f{number}_pick", text)
+    return text
 
 
 def batch_text(formulas: Sequence[FormulaText], tail: str) -> str:
