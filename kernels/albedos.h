@@ -17,7 +17,7 @@ typedef struct {
 } albedo;
 
 // From a table of roughnesses.
-CALLED albedo albedo_at(__global const float *table, real cosine, real roughness) {
+INLINE albedo albedo_at(__global const float *table, real cosine, real roughness) {
     scalar x[LANES], y[LANES], found[LANES], means[LANES];
     lanes_store(sqrt(clamp(cosine, R(0.0), R(1.0))) * (real)((scalar)(ALBEDO_COSINES - 1)), x);
     lanes_store(clamp(roughness, R(0.0), R(1.0)) * (real)((scalar)(ALBEDO_ROUGHNESSES - 1)), y);
@@ -32,7 +32,7 @@ CALLED albedo albedo_at(__global const float *table, real cosine, real roughness
 }
 
 // From tables for square roots of the reflectance at normal incidence, the first of which is given.
-CALLED albedo albedo_of_root(__global const float *tables, real cosine, real roughness, real root) {
+INLINE albedo albedo_of_root(__global const float *tables, real cosine, real roughness, real root) {
     scalar at[LANES];
     albedo low, high;
     real rest = clamp(root * (real)((scalar)ALBEDO_REFLECTANCES), R(0.0), (real)((scalar)ALBEDO_REFLECTANCES - S(1.001)));
