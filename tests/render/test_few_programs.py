@@ -250,7 +250,7 @@ def test_normals_and_points_are_one_program(device: Device) -> None:
     assert all(each == found[0] for each in found)
 
 
-MARCHES = {
+MARCHES: dict[str, dict[str, Any]] = {
     "rays": {},
     "point_rays": {"points": {"count": 4}},
     "steps": {"search": "steps"},
