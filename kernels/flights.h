@@ -54,12 +54,12 @@ INLINE void path_turns(path *so_far, const carried *with, real u, real v, mask h
     so_far->direction = vec_pick(here, phase_direction(so_far->direction, u, v, with->anisotropy), so_far->direction);
 }
 
-// Ends paths within a medium by chance that bring little light, the others bring more for them (Arvo and Kirk 1990); the result says
-// which go on. All that bring more than a quarter do: where nothing is absorbed, any chance of an end would only be noise.
+#include "roulette.h"
+
+// Ends paths within a medium that bring little light; the result says which go on. All that bring more than a quarter do: where nothing is
+// absorbed, any chance of an end would only be noise.
 INLINE mask path_survives(path *so_far, real chance, mask here) {
-    const real stays = fmin(R(4.0) * brightest(so_far->through), R(1.0));
-    const mask goes_on = less(R(0.0), stays) & less(chance, stays);
-    so_far->through = color_pick(here & goes_on, color_scale(so_far->through, R(1.0) / fmax(stays, (real)(REAL_SMALLEST))), so_far->through);
+    const mask goes_on = wins_roulette(&so_far->through, fmin(R(4.0) * brightest(so_far->through), R(1.0)), chance, here);
     so_far->on_path = pick(here, number_of(goes_on), so_far->on_path);
-    return here & goes_on;
+    return goes_on;
 }

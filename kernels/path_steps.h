@@ -43,15 +43,10 @@ INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, 
     flight_begins(with, so_far->through, u, choice, here);
 }
 
-// Ends paths that bring nothing, and after some bounces others by Russian roulette (Arvo and Kirk 1990). `here`: those that have a way to
-// go.
+// Ends paths that bring nothing, and after some bounces others by Russian roulette. `here`: those that have a way to go.
 INLINE void path_stays(stage s, path *so_far, mask here, real roulette, world w) {
     here &= less(R(0.0), brightest(so_far->through));
-    if (s.bounce >= w.settings->roulette) {
-        const real stays = fmin(brightest(so_far->through), R(0.95));
-        here &= less(roulette, stays);
-        so_far->through = color_pick(here, color_scale(so_far->through, R(1.0) / stays), so_far->through);
-    }
+    if (s.bounce >= w.settings->roulette) here = wins_roulette(&so_far->through, fmin(brightest(so_far->through), R(0.95)), roulette, here);
     so_far->on_path = number_of(here);
 }
 

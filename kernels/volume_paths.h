@@ -1,6 +1,7 @@
 // Paths through a medium: at each place where light is scattered one light is asked for, and one direction followed (Kajiya 1986), both
 // weighed as at surfaces. The colour of the transfer function is the part that is scattered, not absorbed.
 #include "phase.h"
+#include "roulette.h"
 #include "volume_bounds.h"
 #include "volume_track.h"
 #include "medium_light.h"
@@ -53,11 +54,7 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     const vec onward = phase_direction(p->direction, u, v, g);
     p->density = phase_of(vec_dot(p->direction, onward), g);
     p->direction = vec_pick(here, onward, p->direction);
-    if (bounce >= w.settings->roulette) {
-        const real stays = fmin(brightest(p->through), R(0.95));
-        p->on_path &= less(roulette, stays);
-        p->through = color_pick(p->on_path, color_scale(p->through, R(1.0) / stays), p->through);
-    }
+    if (bounce >= w.settings->roulette) p->on_path = wins_roulette(&p->through, fmin(brightest(p->through), R(0.95)), roulette, p->on_path);
 }
 
 // The first thing that a path from the eye meets.

@@ -1,0 +1,7 @@
+// Russian roulette (Arvo and Kirk 1990): a path goes on with the probability `stays`, and carries as much more for those that end.
+// `chance`: a number in (0, 1). The result says which of `here` go on.
+INLINE mask wins_roulette(color *through, real stays, real chance, mask here) {
+    const mask goes_on = here & less(chance, stays);
+    *through = color_pick(goes_on, color_scale(*through, R(1.0) / stays), *through);
+    return goes_on;
+}
