@@ -14,7 +14,7 @@ INLINE near_bricks near_bricks_of(ulong place, __global const int *numbers, __co
     near_bricks around = {PLACE_X(place), PLACE_Y(place), PLACE_Z(place)};
     int next = 0;
     // Of a slab they are rows of one whole.
-    for (int z = around.z - 1; z <= around.z + 1 && SOURCE != SOURCE_SLAB; ++z) {
+    for (int z = around.z - 1; SOURCE != SOURCE_SLAB && z <= around.z + 1; ++z) {
         for (int y = around.y - 1; y <= around.y + 1; ++y) {
             for (int x = around.x - 1; x <= around.x + 1; ++x) {
                 const bool there = x >= 0 && x < extent->bricks[0] && y >= 0 && y < extent->bricks[1] && z >= 0 &&
