@@ -15,6 +15,8 @@ from tests.shell import environment
 from tests.window import scenes
 from tests.window.display import Display
 
+pytestmark = pytest.mark.quiet
+
 ROOT = Path(__file__).absolute().parents[2]  # not resolved: tests of the installed package are linked to
 
 # The promise, and ten times as loose.
@@ -23,8 +25,6 @@ LATENCY_MS, FRAMES, PANELS_MS = 10 * 100, 30 / 10, 10 * 33
 CHILD = """
 import json, sys
 from benchmarks.window import measure
-
-pytestmark = pytest.mark.quiet
 found = measure("row", sys.argv[1], sys.argv[2:], size=(1280, 720), seconds=3.0, singles=6, device="pthread")
 print(json.dumps({**found.figures(), "inputs": len(found.stream)}))
 """
