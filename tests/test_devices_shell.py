@@ -90,7 +90,7 @@ def test_the_header_and_the_statistics_name_the_devices(whole: Path, halves: str
     header = read_exr(tmp_path / "out.exr")[1]
     assert sum(each["tiles"] for each in shares) == TILES
     for each in shares:
-        line = f"{each['index']} {each['device']}: {each['tiles']} tiles"
+        line = f"{each['index']} {each['device']}: {each['tiles']} tile{'' if each['tiles'] == 1 else 's'}"
         assert line in header["clfractalDevices"]
         assert line in ended.err
     assert sum(int(run.split("*")[0]) for run in header["clfractalTileDevices"].split()) == TILES
