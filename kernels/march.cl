@@ -2,9 +2,6 @@
 // looked at. Compiled once for each formula.
 #include "orbits.h"
 #include "rays.h"
-#include "march_state.h"
-#include "passed.h"
-#include "proof.h"
 #include "march.h"
 #include "marches.h"
 

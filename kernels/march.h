@@ -3,6 +3,10 @@
 // A ray's cone is `detail` times its pixel's footprint wide. Far from the solid steps follow the distance and how it changes
 // along the ray; within a cone of it the change tells where the ray meets the solid, and the march lands there: close to it,
 // or inside, which brackets the surface between two points.
+#include "march_state.h"
+#include "passed.h"
+#include "proof.h"
+
 #define SLOPE_GAIN R(0.3)        // part of a newly measured slope
 #define LANDING R(1.0)           // of the cone: from this distance on the march lands
 #define LANDING_AIM R(0.05)      // of the cone: the distance that a landing step aims at

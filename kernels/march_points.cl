@@ -1,9 +1,6 @@
 // The same where pixels have points. What their rays know already is one number more in a march, and takes a twentieth more time.
 #include "orbits.h"
 #include "rays.h"
-#include "march_state.h"
-#include "passed.h"
-#include "proof.h"
 #include "march.h"
 #include "marches.h"
 

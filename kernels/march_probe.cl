@@ -2,9 +2,6 @@
 // of LANES rays. Nothing is shaded, so it compiles in a fraction of a renderer's time; a picture's time is mostly that of the same.
 #include "orbits.h"
 #include "rays.h"
-#include "march_state.h"
-#include "passed.h"
-#include "proof.h"
 #include "march.h"
 #include "queue.h"
 #include "share.h"
