@@ -298,10 +298,10 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
     (
         "or, by the points of a pixel",
         (
-            "march_rays? near",
+            "march_points? near",
             "send_points?",
             "meet_objects?",
-            "march_rays? surface",
+            "march_points? surface",
             "look_at_objects?",
             "join_points?",
         ),
@@ -336,18 +336,21 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
         ("meet_objects?", "march_rays? whether", "cross_media?", "end_paths?"),
     ),
 )
-# Kernels that stand in the place of one that is drawn: for single lanes, points of pixels, the other search, cloudy glass.
+# Kernels that stand in the place of one that is drawn: for single lanes, the other search, cloudy glass.
 _BESIDE = {
-    "march_rays": (
-        "look_at_surfaces",
-        "march_points",
-        "look_at_points",
-        "step_rays",
-        "look_where_steps_end",
-    ),
+    "march_rays": ("look_at_surfaces", "step_rays", "look_where_steps_end"),
+    "march_points": ("look_at_points",),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }
-_ASK_FORMULA = ("march_rays", "march_inside", "color_spots", "add_glow", "find_faces", "find_planes")
+_ASK_FORMULA = (
+    "march_rays",
+    "march_points",
+    "march_inside",
+    "color_spots",
+    "add_glow",
+    "find_faces",
+    "find_planes",
+)
 
 
 def drawn_kernels() -> set[str]:
@@ -358,7 +361,7 @@ def drawn_kernels() -> set[str]:
 
 def stages() -> Drawing:
     """The stages of a surface, row by row, and what they hand to each other."""
-    wide, tall, left, top, width, height = 1320, 880, 24.0, 66.0, 138.0, 40.0
+    wide, tall, left, top, width, height = 1320, 892, 24.0, 66.0, 138.0, 40.0
     sheet = Drawing(wide, tall)
     sheet.text(
         (left, 28),
@@ -391,7 +394,12 @@ def stages() -> Drawing:
     for x, color, opacity, told in (*legend, (486, INK, 0.04, "pale: launched only by scenes that need it")):
         sheet.box((left + x, low - 9), (26, 18), color, opacity)
         sheet.text((left + x + 36, low), told, anchor="lm", size=14)
-    _queues(sheet, (left, low + 60), width, height)
+    told = (
+        "where pixels have points march_points marches all rays, and the search by steps is step_rays;"
+        " walk_inside is march_inside of cloudy glass"
+    )
+    sheet.text((left, low + 26), told, PALE, anchor="lm", size=14)
+    _queues(sheet, (left, low + 72), width, height)
     return sheet
 
 
