@@ -195,6 +195,8 @@ class Link:
             self.refused.discard(address)
 
     def _gone(self, address: str) -> None:
+        # A reading from a worker that is silent would not end: with its connections closed, Dask asks others.
+        self.client.rpc.remove(address)
         task = self._enlisting.pop(address, None)
         if task is not None:
             task.cancel()

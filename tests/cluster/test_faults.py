@@ -97,6 +97,30 @@ def test_a_worker_that_stops_answering(farm: Farm, monkeypatch: pytest.MonkeyPat
     assert told[0].endswith("does not answer; its work goes to others")
 
 
+def test_a_worker_that_stops_while_it_is_read(
+    farm: Farm, monkeypatch: pytest.MonkeyPatch, alone: Path
+) -> None:
+    """Its connection stays open, and nothing comes any more: what it had is done again by the other one."""
+    worker = pytest.importorskip("distributed.worker")
+    monkeypatch.setattr(link, "SILENT_SECONDS", 3.0)
+    told, left = list[str](), ["w0"]
+
+    async def read(rpc: object, keys: object, address: str, *more: object, **settings: object) -> object:
+        # (It has given an answer before, so its connection is there, and the time limit of connecting does not count.)
+        if any(share.address == address and share.name in left for share in cluster.shares()):
+            os.kill(farm.workers[left.pop()].pid, signal.SIGSTOP)
+        return await usual(rpc, keys, address, *more, **settings)
+
+    usual = worker.get_data_from_worker
+    monkeypatch.setattr(worker, "get_data_from_worker", read)
+    with clfractal.Cluster(farm.address, tell=told.append) as cluster:
+        found = clfractal.render(HEAVY, executor=cluster)
+    whole, _ = read_exr(alone / "out.exr")
+    assert not left
+    assert all(found[name].tobytes() == whole[name].tobytes() for name in ("R", "Z", "N.X"))
+    assert [line.partition(" (")[0] for line in told] == ["worker w0"]
+
+
 def test_late_workers_join_and_early_ones_go(folder: Path, picture: dict[str, bytes]) -> None:
     with Farm(folder, workers=0) as farm:
         order = ["render", "heavy.yaml", "-o", "out.exr", "--stats", "s.json", "--cluster", farm.address]
