@@ -13,6 +13,8 @@ import numpy.typing as npt
 
 from clfractal.cluster.message import Message
 from clfractal.errors import ClfractalError
+from clfractal.renderers.lanes import rule_of
+from clfractal.renderers.plan import PlannedView
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
@@ -40,6 +42,7 @@ class ClusterEngine(AnyEngine):
         self.cluster = cluster
         self.executor = cluster
         self._job_bytes: int | None = None  # of the results of a job, as far as one is known
+        self._lanes: dict[tuple[str, ...], int] = {}  # by device, number type and rule
 
     def close(self) -> None:
         """The engine cannot be used afterwards; the cluster can."""
@@ -131,8 +134,15 @@ class ClusterEngine(AnyEngine):
     def _decided(self, asked: _Asked) -> Job:
         answer, self.looks_built_ms = self.cluster.answered(asked.future)
         job: Job = self.cluster.unpacked(answer, asked.message)
+        job = replace(job, views=tuple(self._in_first_lanes(view, job.device.key) for view in job.views))
         remark = self._remark(job)
         return replace(job, remark="; ".join(filter(None, (job.remark, remark)))) if remark else job
+
+    def _in_first_lanes(self, view: PlannedView, device: str) -> PlannedView:
+        """A view with the lanes that the first like it had: frames of a film are decided by several workers, and one that
+        measures its device meanwhile has others."""
+        own = device, view.plan.precision, rule_of(view.scene.chain)
+        return replace(view, plan=replace(view.plan, lanes=self._lanes.setdefault(own, view.plan.lanes)))
 
     def _remark(self, job: Job) -> str:
         workers, others, names = self.cluster.others()

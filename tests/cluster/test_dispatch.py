@@ -49,6 +49,7 @@ class Played:
     def __init__(self, answer: Callable[[WorkItem], Any]) -> None:
         self._answer, self._loop = answer, asyncio.get_running_loop()
         self.asked: list[tuple[str, Any]] = []  # the function, and among which workers
+        self.rpc = SimpleNamespace(remove=lambda _: None)
 
     def submit(self, function: Any, *values: Any, key: str, workers: Any = None, **_: Any) -> Any:
         self.asked.append((function.__name__, workers))
@@ -164,7 +165,7 @@ def test_each_answer_tells_its_maker(job: Job) -> None:
 
 def test_workers_are_counted_while_they_come_and_go(job: Job) -> None:
     """Another thread reads what the loop's thread changes."""
-    own = linked(None, [])
+    own = linked(SimpleNamespace(rpc=SimpleNamespace(remove=lambda _: None)), [])
     cluster = Cluster.__new__(Cluster)
     cluster._dispatcher = SimpleNamespace(link=own)  # type: ignore[assignment]
     ended = threading.Event()
@@ -218,6 +219,24 @@ def test_jobs_that_nobody_executes_are_left(job: Job) -> None:
     assert len(begun) > 2
     assert {id(each) for each in taken} <= {id(each) for each in begun}
     assert sorted(map(id, left)) == sorted(map(id, begun))
+
+
+def test_all_frames_of_a_film_have_the_lanes_of_the_first(job: Job) -> None:
+    """Whichever worker decides about them, and whatever it has measured meanwhile; another device has its own."""
+    view, other = job.views[0], replace(job.device, driver="another")
+    decided = [
+        replace(job, device=device, views=(replace(view, plan=replace(view.plan, lanes=lanes)),))
+        for device, lanes in ((job.device, 16), (job.device, 8), (other, 4), (job.device, 4), (other, 16))
+    ]
+    answers = iter(decided)
+    cluster = SimpleNamespace(
+        asking=lambda *_, **__: (Future(), Message(b"")),
+        answered=lambda _: (None, 0.0),
+        unpacked=lambda *_: next(answers),
+        others=lambda: (2, 0, []),
+    )
+    engine = ClusterEngine(cluster)  # type: ignore[arg-type]
+    assert [engine.prepare(job.scene).lanes for _ in decided] == [16, 16, 4, 16, 4]
 
 
 def test_a_picture_in_float64_waits_for_its_workers_only(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -283,13 +302,14 @@ def test_only_our_own_silent_workers_are_taken_off(job: Job, monkeypatch: pytest
     told: list[str] = []
 
     async def main() -> None:
-        scheduler = Registered()
-        own = linked(SimpleNamespace(scheduler=scheduler), [member(0, job.device)], told)
+        scheduler, closed = Registered(), list[str]()
+        client = SimpleNamespace(scheduler=scheduler, rpc=SimpleNamespace(remove=closed.append))
+        own = linked(client, [member(0, job.device)], told)
         own.refused.add("tcp://host:1")
         about = {f"tcp://host:{number}": {"last_seen": 1.0, "name": f"w{number}"} for number in range(2)}
         for _ in range(3):
             await own._look(about)
-        assert scheduler.removed == ["tcp://host:0"]
+        assert scheduler.removed == closed == ["tcp://host:0"]
         assert own.serving == []
 
     asyncio.run(main())
@@ -306,7 +326,7 @@ def test_a_worker_that_returns_is_asked_again(job: Job, monkeypatch: pytest.Monk
             asked.append(address)
             own._enlisting.pop(address)
 
-        own = linked(None, [member(0, job.device)])
+        own = linked(Played(lambda _: None), [member(0, job.device)])
         monkeypatch.setattr(own, "_enlist", enlist)
         own.leave_out("tcp://host:0", "its device failed")
         there = {"tcp://host:0": {"last_seen": 1.0, "name": "w0"}}
