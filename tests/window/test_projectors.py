@@ -138,9 +138,13 @@ def test_a_window_that_is_resized_is_another_screen_and_says_so(
             now = window.pixels()
             return np.array_equal(now[210:], plain[210:]) and not np.array_equal(now[:210], plain[:210])
 
+        def saved() -> bool:
+            """(The window may have its new size before the program has heard of it.)"""
+            window.save()
+            return width_in(tmp_path) == 2
+
         wait_for(told, "the line about it", 10)
-        window.save()
-    assert width_in(tmp_path) == 2
+        wait_for(saved, "the old number", 10)
 
 
 def test_a_projector_that_goes_and_comes_back(projectors: Projectors, wall: Pixels, tmp_path: Path) -> None:
