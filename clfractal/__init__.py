@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from clfractal.pictures.film import Film as Film
     from clfractal.pictures.probe import Probe as Probe
     from clfractal.renderers.points import Distances as Distances
+    from clfractal.resources import __version__ as __version__
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
     from clfractal.work.engine import Engine as Engine
@@ -44,8 +45,6 @@ if TYPE_CHECKING:
     from clfractal.work.frames import frames as frames
     from clfractal.work.run import Progress as Progress
     from clfractal.work.variations import variations as variations
-
-__version__ = "0.1.0"
 
 _HOMES = {
     "distances": "clfractal.api",
@@ -71,6 +70,7 @@ _HOMES = {
     "Film": "clfractal.pictures.film",
     "Probe": "clfractal.pictures.probe",
     "Distances": "clfractal.renderers.points",
+    "__version__": "clfractal.resources",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
     "Engine": "clfractal.work.engine",
@@ -80,7 +80,7 @@ _HOMES = {
     "variations": "clfractal.work.variations",
 }
 
-__all__ = ["__version__", *_HOMES]
+__all__ = [*_HOMES]
 
 
 if not TYPE_CHECKING:  # for a type checker every name would exist

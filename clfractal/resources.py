@@ -1,10 +1,12 @@
-"""Finds the data that is installed with the program: kernels, scenes and the formula library."""
+"""What is installed: the program's version, and its data, which are kernels, scenes and the formula library."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-_PACKAGE = Path(__file__).resolve().parent
+__version__ = "0.1.0"
+
+PACKAGE = Path(__file__).resolve().parent
 
 
 def folder(name: str) -> Path:
@@ -15,7 +17,7 @@ def folder(name: str) -> Path:
     Raises:
         FileNotFoundError: the installation is incomplete.
     """
-    for root in (_PACKAGE, _PACKAGE.parent):
+    for root in (PACKAGE, PACKAGE.parent):
         candidate = root / name
         if candidate.is_dir():
             return candidate

@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Future
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -21,13 +21,35 @@ from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.work.any_engine import AnyEngine, SceneLike
 from clfractal.work.job import Job
 from clfractal.work.look import Look
-
-if TYPE_CHECKING:
-    from clfractal.cluster.cluster import Cluster
+from clfractal.work.run import Executor
 
 # Frames of a film that are rendered before they are asked for, at most: their results lie with the workers, bytes.
 _AHEAD_BYTES = 1 << 30
 _MOST_AHEAD = 256
+
+
+class Workers(Executor, Protocol):
+    """What the engine asks of a cluster; see `Cluster`, which is one."""
+
+    def asking(
+        self, function: Callable[..., Any], thing: Any, *more: Any, float64: bool = False
+    ) -> tuple[Future[Any], Message]:
+        """Asks a function of `tasks`."""
+
+    def answered(self, asked: Future[Any]) -> Any:
+        """The answer."""
+
+    def unpacked(self, message: Message, asked: Message) -> Any:
+        """The thing in an answer."""
+
+    def begin(self, job: Job) -> None:
+        """Begins to render a job before it is executed."""
+
+    def leave(self, job: Job) -> None:
+        """Ends a job that was begun, if nobody has executed it."""
+
+    def others(self) -> tuple[int, int, list[str]]:
+        """The number of workers, and of those with another device than most have; the names of these devices."""
 
 
 class ClusterEngine(AnyEngine):
@@ -37,7 +59,7 @@ class ClusterEngine(AnyEngine):
         cluster: stays open when the engine is closed.
     """
 
-    def __init__(self, cluster: Cluster) -> None:
+    def __init__(self, cluster: Workers) -> None:
         super().__init__()
         self.cluster = cluster
         self.executor = cluster
@@ -165,7 +187,7 @@ class _Asked:
 class _DistantLook(Look):
     """Looks of a worker; what is seen comes back as points."""
 
-    def __init__(self, cluster: Cluster) -> None:
+    def __init__(self, cluster: Workers) -> None:
         self._cluster = cluster
 
     def points(self, scene: Scene, eye: Eye = MIDDLE) -> npt.NDArray[np.float64]:

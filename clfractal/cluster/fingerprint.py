@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from functools import cache
-from pathlib import Path
 
-import clfractal
 from clfractal import resources
 
 _LENGTH = 12
@@ -18,8 +16,8 @@ def fingerprint() -> str:
 
     Line ends do not count: a checkout on Windows may have others.
     """
-    found = hashlib.sha256(clfractal.__version__.encode())
-    for home, pattern in ((Path(clfractal.__file__).parent, "*.py"), (resources.folder("kernels"), "*")):
+    found = hashlib.sha256(resources.__version__.encode())
+    for home, pattern in ((resources.PACKAGE, "*.py"), (resources.folder("kernels"), "*")):
         files = {path.relative_to(home).as_posix(): path for path in home.rglob(pattern) if path.is_file()}
         for name in sorted(files):
             found.update(f"\n{name}\n".encode())

@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
-import clfractal
+from clfractal import resources
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.device.select import DeviceInfo, has_float64
 
@@ -278,7 +278,7 @@ class Link:
             self._refuse(address, name, report["fault"])
         else:
             theirs = f"clfractal {report['version']} ({report['fingerprint']})"
-            own = f"clfractal {clfractal.__version__} ({fingerprint()})"
+            own = f"clfractal {resources.__version__} ({fingerprint()})"
             self._refuse(address, name, f"it has {theirs}, and this is {own}")
 
     def _refuse(self, address: str, name: object, reason: str) -> None:

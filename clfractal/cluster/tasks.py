@@ -19,8 +19,7 @@ import numpy as np
 from distributed import WorkerPlugin, get_worker
 from distributed.utils import sync
 
-import clfractal
-from clfractal import errors
+from clfractal import errors, resources
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.cluster.message import Arrays, Digests, Message, pack, unpack
 from clfractal.device.cancel import CancelToken
@@ -130,7 +129,7 @@ def enlist(wanted: str, device: str | None, share: tuple[int, int] | None) -> di
         `version`, `fingerprint`, `pid`; `device`, its `DeviceInfo`, or `fault`, why there is none.
     """
     report: dict[str, Any] = {
-        "version": clfractal.__version__,
+        "version": resources.__version__,
         "fingerprint": fingerprint(),
         "pid": os.getpid(),
     }

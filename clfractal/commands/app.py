@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-import clfractal
+from clfractal import resources
 from clfractal.commands import list_facts, list_grids, list_pictures, list_scenes, list_window
 from clfractal.commands.completion import check_shell
 from clfractal.commands.options import app
@@ -98,7 +98,7 @@ def _application(arguments: Sequence[str]) -> typer.Typer:
 
 def _version(wanted: bool) -> None:
     if wanted:
-        typer.echo(f"clfractal {clfractal.__version__}")
+        typer.echo(f"clfractal {resources.__version__}")
         raise typer.Exit
 
 

@@ -16,8 +16,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-import clfractal
-from clfractal import errors
+from clfractal import errors, resources
 from clfractal.device import children, drivers_folder
 from clfractal.device.child import ANSWER, FAILED, NOISE, REQUEST
 from clfractal.device.select import Device
@@ -126,7 +125,7 @@ drivers_folder.users.append(end_children)
 
 def _wait_for_child(folder: Path, timeout_s: float, stopped: Callable[[], bool] | None) -> int | None:
     """0 once a request is answered; else the child's exit status; None if it was killed for taking too long."""
-    package_root = str(Path(clfractal.__file__).resolve().parent.parent)
+    package_root = str(resources.PACKAGE.parent)
     paths = [package_root, *filter(None, [os.environ.get("PYTHONPATH")])]
     environment = {
         **os.environ,

@@ -3,44 +3,31 @@
 from __future__ import annotations
 
 import time
-from collections import deque
 from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.device import gl_sharing
-from clfractal.device.select import Device, choose, devices
+from clfractal.device.select import choose, devices
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
 from clfractal.optics.view import scene_view, seen_by
-from clfractal.scene.stereo import MIDDLE, Mode, Stereo
-from clfractal.viewer import gl, marks, window
-from clfractal.viewer.aim import Aim, aimed
+from clfractal.scene.stereo import MIDDLE
+from clfractal.viewer import marks, window
 from clfractal.viewer.begin import Begun
-from clfractal.viewer.controls import Controls
 from clfractal.viewer.deeds import Deeds
 from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.inputs import Inputs
 from clfractal.viewer.measuring import Measuring
-from clfractal.viewer.motion import Motion
-from clfractal.viewer.outputs import Outputs
 from clfractal.viewer.own_screen import OwnScreen
-from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.panels import all_panels, theme, timeline_area
+from clfractal.viewer.panels import all_panels, timeline_area
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.picking import Pick
-from clfractal.viewer.places import Places, places_of
-from clfractal.viewer.playing import Player
-from clfractal.viewer.recording import Event
+from clfractal.viewer.places import places_of
 from clfractal.viewer.room import Room
 from clfractal.viewer.settings import Settings
-from clfractal.viewer.speed import Meter
-from clfractal.viewer.studio import Studio
-from clfractal.viewer.surface import Surface
+from clfractal.viewer.shots import Drawn
 from clfractal.viewer.ui_renderer import UiRenderer
-from clfractal.viewer.viewport import image_of
-from clfractal.viewer.window import Window
+from clfractal.viewer.workspace import Workspace
 
 _IDLE_SECONDS = 0.5
 """How long the loop sleeps at most when nothing happens."""
@@ -50,8 +37,8 @@ _REDRAWN = 3
 """Frames that are drawn after an event: panels need some to take it in."""
 
 
-class Viewer:
-    """A window on a scene.
+class Viewer(Workspace):
+    """A window on a scene: a workspace, and the loop that keeps it alive.
 
     Args:
         begun: the options, the scene, the device, and a display.
@@ -65,58 +52,28 @@ class Viewer:
     """
 
     def __init__(self, begun: Begun, settings: Settings, remark: str, tell: Callable[[str], None]) -> None:
-        self.options, self.settings, self.tell = begun.options, settings, tell
-        options, scene, device = begun.options, begun.scene, begun.device
-        self.files = begun.files
-        self.events: deque[Event] = deque()
+        self.tell = tell
         self.started = time.perf_counter()
-        self.window = Window(begun.size, self.events.append)
-        gl_version = gl.version()
-        if gl_version < (3, 3):
-            raise window.no_opengl(f"{gl_version[0]}.{gl_version[1]}")
-        self._context = imgui.create_context()
-        imgui.get_io().set_ini_filename("")
-        theme.setup()
-        self.renderer = UiRenderer(self.window.handle)
-        self.outputs = Outputs(self.window, self.events.append)
-        # The screens that are filled come before the first picture, which is theirs.
-        self.outputs.begin(options)
-        self.pacing = Pacing(settings.frame_rate, settings.used_coarsest)
-        device, self.shared, why = self._opened(device)
-        self.studio = Studio(scene, device, self.pacing, window.wake)
-        self.motion = Motion(self.studio)
-        self._set_motion(settings)
-        self.player = Player(self.studio)
-        self.controls = Controls(self.studio, settings, self.motion)
-        self.studio.screens = self.outputs.shown_stereo
-        self.studio.resize(*self.outputs.picture_size(scene.stereo))
+        super().__init__(begun, settings)
         self.own_screen = OwnScreen(self.studio)
         self.depth_range, self.room = DepthRange(), Room()
         self.pads = window.Pads()
-        self.meter = Meter()
-        self.small = gl.SmallTextures()
-        self.surface = self._new_surface()
-        self.ui = Ui(self.studio, settings, settings.key_map, self.small, self.act)
-        self.ui.memory |= {"controls": self.controls, "player": self.player}
         self.deeds = Deeds(self)
-        self.deeds.scene.first_stereo = self._screen
-        self.inputs = Inputs(self, begun.recording)
-        self.places: Places = places_of(scene.stereo, self.window.framebuffer)
-        self.pick: Pick | None = None
-        self.finished = False
-        self._hidden, self._measuring = False, Measuring(options)
+        self.deeds.scene.first_stereo = self.screen
+        self.inputs = Inputs(self, self.deeds, begun.recording)
+        self._hidden, self._measuring = False, Measuring(begun.options)
         self._told: Any = None
         self._failed: set[str] = set()
         self._redraw = _REDRAWN
         self._last = time.perf_counter()
         self._drawn_at = self._last
-        for line in (remark, why, *self.files.remarks):
+        for line in (remark, self.remark, *self.files.remarks):
             if line:
                 self.studio.tell(line, wrong=True)
-        self.files.attach(self)
-        if scene.animation is not None:
+        self.files.attach(self.studio, self.outputs, self.ui.show, self.window.title)
+        if begun.scene.animation is not None:
             self.studio.go_to_frame(0.0)
-        if not options.panels or options.fullscreen or options.monitors is not None:
+        if not begun.options.panels or begun.options.fullscreen or begun.options.monitors is not None:
             self.ui.show.clear()  # F2 brings the panels; who fills a screen or a projector wants the picture
 
     # The loop
@@ -128,7 +85,7 @@ class Viewer:
             KeyboardInterrupt: Ctrl-C in the shell. The process has to end at once, so nothing is waited for.
         """
         try:
-            while not self.finished:
+            while not self.files.finished:
                 self.turn()
         except KeyboardInterrupt:
             self.files.keep()
@@ -167,7 +124,7 @@ class Viewer:
             self._redraw = max(self._redraw, 1)
         self._take_settings()
         self.controls.rest(now)
-        self.files.tick(now)
+        self.files.tick(now, self.settings, dragging=self.controls.dragging, played=self.inputs.played)
         self._follow(now)
         arrived = self.surface.update()
         if arrived:
@@ -179,29 +136,16 @@ class Viewer:
             self.draw(now)
         limit = self.options.seconds
         if limit is not None and now - self.started > limit:
-            self.finished = True
+            self.files.leave()
 
     def act(self, name: str) -> None:
         """Does an action; see `Deeds`."""
         self.deeds.do(name)
         self._redraw = _REDRAWN
 
-    @property
-    def now(self) -> float:
-        """Seconds, of the loop's clock."""
-        return time.perf_counter()
-
     def redraw(self) -> None:
         """Something that is drawn has changed."""
         self._redraw = _REDRAWN
-
-    def set_settings(self, settings: Settings) -> None:
-        """The user's settings have changed."""
-        self.settings = settings
-        self.ui.settings = self.controls.settings = self.deeds.scene.settings = settings
-        self.ui.keys = settings.key_map
-        self._set_motion(settings)
-        self.pacing.rate, self.pacing.coarsest = settings.frame_rate, settings.used_coarsest
 
     def _take_settings(self) -> None:
         """A panel has changed the user's settings: they count at once, and are kept."""
@@ -213,43 +157,7 @@ class Viewer:
         except ClfractalError as error:
             self.studio.tell(str(error), wrong=True)
 
-    def _set_motion(self, settings: Settings) -> None:
-        self.motion.sensitivity = settings.mouse
-        self.motion.level = settings.orbit == "turntable"
-        self.motion.fly.factor = settings.fly_speed
-
-    def use_device(self, device: Device) -> None:
-        """Goes on with another device."""
-        self.surface.close()
-        device, self.shared, why = self._opened(device)
-        self.studio.use_device(device)
-        self.surface = self._new_surface()
-        if why:
-            self.studio.tell(why)
-        self.studio.tell(f"device: {device.info.name}")
-
     # The picture
-
-    def _opened(self, device: Device) -> tuple[Device, bool, str]:
-        """The device with a context for this window, whether textures are shared, and why not if that is a surprise."""
-        if self.options.share and device.info.gl_sharing:
-            try:
-                handles = gl_sharing.current_handles()
-                if gl_sharing.shares_with(device, handles):
-                    return gl_sharing.opened_with(device, handles), True, ""
-            except ClfractalError as error:
-                return device.reopened(), False, f"pictures are copied, not shared: {error.message}"
-        return device.reopened(), False, ""
-
-    def _new_surface(self) -> Surface:
-        session = self.studio.session
-        return Surface(
-            session.device,
-            session.pool,
-            shared=self.shared,
-            woken=window.wake,
-            remark=lambda line: self.studio.tell(line, wrong=True),
-        )
 
     def _follow(self, now: float) -> None:
         """The studio learns the window's size, the surface what to show."""
@@ -290,13 +198,6 @@ class Viewer:
             elif not hidden:
                 session.pause(False)
 
-    def _screen(self, mode: Mode) -> dict[str, Any]:
-        """The width of one eye's picture where the window is, for a scene that names none."""
-        stereo = self.outputs.shown_stereo(Stereo(mode=mode))
-        part = image_of(stereo, self.outputs.picture_size(stereo))[0] / max(self.window.framebuffer[0], 1)
-        wide = window.physical_width(self.window.monitor(), round(part * self.window.size[0]))
-        return {} if wide is None else {"screen_width": round(wide, 4)}
-
     def _mind_comfort(self) -> None:
         """Warns of a pair that strains the eyes, as of one that is written to a file; a shot is of the picture."""
         moves = self.controls.dragging or self.motion.active or self.player.playing
@@ -321,31 +222,6 @@ class Viewer:
             self.studio.tell(f"{problem.message}; going on with {others[0].name}", wrong=True)
             self.use_device(choose(others[0].index))
 
-    def aim(self) -> Aim | None:
-        """What is under the pointer; else, or where a panel is there, under the middle of the picture."""
-        found = None if imgui.get_io().want_capture_mouse else self.aim_at(*self.inputs.pointer)
-        if found is not None:
-            return found
-        width, height = self.window.framebuffer
-        return self.aim_at(width / 2, height / 2)
-
-    def aim_at(self, x: float, y: float) -> Aim | None:
-        """What lies at a place of the window, framebuffer pixels from the top left."""
-        pick = self.pick_at(x, y)
-        return aimed(self.studio.shown_scene, pick) if pick is not None else None
-
-    def pick_at(self, x: float, y: float) -> Pick | None:
-        """The same of the picture that is shown, which may be older than the scene."""
-        shown = self.surface.shown
-        if shown is None:
-            return None
-        width, height = self.surface.size
-        wide, high = self.window.framebuffer
-        if width < 1 or height < 1 or wide < 1 or high < 1:
-            return None
-        across, down = self.outputs.to_picture(x, y, (width, height))
-        return self.studio.pick(across, down, shown)
-
     def draw(self, now: float) -> None:
         """Draws the picture and the panels, and shows them."""
         self.window.use()
@@ -358,7 +234,9 @@ class Viewer:
             self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
         )
         self._redraw_while_busy()
-        self.files.after_draw()
+        still = self.inputs.played and not self.motion.active
+        if self.files.after_draw(Drawn(self.surface.shown, still, self.outputs.read, self.picture_alone)):
+            self.redraw()
         self.outputs.swap()
         self.meter.swapped(time.perf_counter())
 
@@ -388,10 +266,10 @@ class Viewer:
         size = (self.places.ui_size[0] / scale, self.places.ui_size[1] / scale)
         self.renderer.begin(size, (scale, scale), now - self._drawn_at)
         self._drawn_at = now
-        self.pick = None if imgui.get_io().want_capture_mouse else self.pick_at(*self.inputs.pointer)
+        pick = None if imgui.get_io().want_capture_mouse else self.pick_at(*self.pointer)
         imgui.new_frame()
         ui = self.ui
-        ui.size, ui.scale, ui.pick, ui.shown = size, scale, self.pick, self.surface.shown
+        ui.size, ui.scale, ui.pick, ui.shown = size, scale, pick, self.surface.shown
         ui.comfort = self.depth_range.comfort if self.studio.scene.stereo is not None else None
         self.room.fit(ui, alone=self.outputs.fills_screens)
         ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
@@ -485,16 +363,10 @@ class Viewer:
         return max(min(wait, self.files.patience), 0.001)
 
     def close(self) -> None:
-        """Ends everything; the order matters: OpenCL's images before OpenGL's textures, and those before the window."""
+        """Ends a recording, safety copies and films, then all parts of the window."""
         self.inputs.close()
         self.files.close()
         self.studio.session.pause()
         for line in self.studio.films.close():
             self.tell(line)
-        self.surface.close()
-        self.studio.close()
-        self.small.close()
-        self.renderer.shutdown()
-        imgui.destroy_context(self._context)
-        self.outputs.close()
-        window.stop()
+        super().close()

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from imgui_bundle import imgui
 
@@ -15,9 +14,7 @@ from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
 from clfractal.viewer.panels import all_panels, keyboard
 from clfractal.viewer.scene_deeds import SceneDeeds
-
-if TYPE_CHECKING:
-    from clfractal.viewer.app import Viewer
+from clfractal.viewer.workspace import Workspace
 
 HELD: dict[str, Key] = {
     "fly_forward": "forward",
@@ -54,27 +51,26 @@ class Deeds:
         flying: whether the pointer is hidden and turns the head.
     """
 
-    def __init__(self, viewer: Viewer) -> None:
-        self.viewer = viewer
+    def __init__(self, workspace: Workspace) -> None:
+        self.workspace = workspace
         self.scene = SceneDeeds(
-            viewer.studio,
-            viewer.controls,
-            viewer.motion,
-            viewer.settings,
-            viewer.aim,
-            lambda: viewer.now,
+            workspace.studio,
+            workspace.controls,
+            workspace.motion,
+            workspace.aim,
+            lambda: workspace.now,
         )
         self.chart_shown = False
         self.flying = False
-        files = viewer.files
+        files = workspace.files
         self._deeds: dict[str, Callable[[], None]] = {
             **self.scene.deeds,
             **self._film(),
             **{name: self._switch(part) for name, part in _PARTS.items()},
-            "into_panels": lambda: keyboard.enter(viewer.ui),
+            "into_panels": lambda: keyboard.enter(workspace.ui),
             "next_device": self._next_device,
-            "full_screen": viewer.outputs.full_screen,
-            "span_monitors": viewer.outputs.span,
+            "full_screen": workspace.outputs.full_screen,
+            "span_monitors": workspace.outputs.span,
             "window_per_monitor": self._second_window,
             "cancel": self.cancel,
             "quit": files.ask_to_close,
@@ -100,14 +96,14 @@ class Deeds:
 
         What goes wrong becomes a message.
         """
-        studio = self.viewer.studio
+        studio = self.workspace.studio
         studio.begin_topic(name)
         try:
             kind, colon, rest = name.partition(":")
             if colon and kind == "device":
-                self.viewer.use_device(choose(rest))
+                self.workspace.use_device(choose(rest))
             elif colon and kind == "open":
-                self.viewer.files.open(Path(rest))
+                self.workspace.files.open(Path(rest))
             elif name in self._deeds:
                 self._deeds[name]()
         except ClfractalError as error:
@@ -121,10 +117,10 @@ class Deeds:
         return set(self._deeds) | set(HELD)
 
     def _film(self) -> dict[str, Callable[[], None]]:
-        viewer, player = self.viewer, self.viewer.player
+        work, player = self.workspace, self.workspace.player
         return {
             "timeline": player.open_film,
-            "play": lambda: player.play(viewer.now),
+            "play": lambda: player.play(work.now),
             "play_repeat": player.switch_repeat,
             "frame_back": lambda: player.by(-1),
             "frame_forward": lambda: player.by(1),
@@ -137,91 +133,91 @@ class Deeds:
             "play_all": player.span_clear,
             "set_keys": player.set_keys,
             "auto_keys": player.switch_auto_keys,
-            "delete_keys": lambda: timeline_view.of(viewer.ui.memory).delete(viewer.studio),
-            "record_flight": lambda: player.record(viewer.now),
+            "delete_keys": lambda: timeline_view.of(work.ui.memory).delete(work.studio),
+            "record_flight": lambda: player.record(work.now),
         }
 
     def cancel(self) -> None:
         """Escape: closes a menu, ends what is under way, then closes what is open, then stops rendering."""
-        viewer = self.viewer
+        work = self.workspace
         if all_panels.menu_is_open():
-            viewer.ui.memory[all_panels.CLOSE_MENU] = True
+            work.ui.memory[all_panels.CLOSE_MENU] = True
         elif imgui.get_io().want_text_input:
             return  # the field gives up what was typed
-        elif keyboard.inside(viewer.ui):
-            keyboard.leave(viewer.ui)
+        elif keyboard.inside(work.ui):
+            keyboard.leave(work.ui)
         elif self.flying:
             self.fly()
-        elif viewer.controls.cancel():
+        elif work.controls.cancel():
             return
-        elif viewer.player.playing or viewer.player.recording:
-            viewer.player.play(viewer.now)
+        elif work.player.playing or work.player.recording:
+            work.player.play(work.now)
         elif self.chart_shown:
             self.chart_shown = False
-        elif viewer.ui.show & _CLOSED_BY_ESCAPE:
-            viewer.ui.show -= _CLOSED_BY_ESCAPE
-        elif any(not still.finished for still in viewer.studio.stills):
-            for still in viewer.studio.stills:
+        elif work.ui.show & _CLOSED_BY_ESCAPE:
+            work.ui.show -= _CLOSED_BY_ESCAPE
+        elif any(not still.finished for still in work.studio.stills):
+            for still in work.studio.stills:
                 still.cancel()
-            viewer.studio.tell("stills are cancelled")
-        elif viewer.studio.films.cancel():
-            viewer.studio.tell("films are cancelled; their frames are kept")
+            work.studio.tell("stills are cancelled")
+        elif work.studio.films.cancel():
+            work.studio.tell("films are cancelled; their frames are kept")
         else:
-            viewer.motion.stop()
-            viewer.studio.session.pause()
-            viewer.studio.tell("stopped; Space goes on", holds=lambda: viewer.studio.session.paused)
+            work.motion.stop()
+            work.studio.session.pause()
+            work.studio.tell("stopped; Space goes on", holds=lambda: work.studio.session.paused)
 
     def fly(self) -> None:
         """Hides the pointer, which then turns the head; or shows it again."""
         self.flying = not self.flying
-        self.viewer.window.hide_pointer(self.flying)
+        self.workspace.window.hide_pointer(self.flying)
         if not self.flying:
-            self.viewer.motion.stop()
-            self.viewer.studio.end_gesture()
+            self.workspace.motion.stop()
+            self.workspace.studio.end_gesture()
 
     def _switch(self, part: str) -> Callable[[], None]:
         def switch() -> None:
-            self.viewer.ui.show ^= {part}
+            self.workspace.ui.show ^= {part}
 
         return switch
 
     def _next_device(self) -> None:
         there = devices()
-        now = self.viewer.studio.session.device.info
+        now = self.workspace.studio.session.device.info
         place = next((n for n, info in enumerate(there) if info.index == now.index), -1)
         if len(there) < 2:
-            self.viewer.studio.tell("there is no other device")
+            self.workspace.studio.tell("there is no other device")
             return
-        self.viewer.use_device(choose(there[(place + 1) % len(there)].index))
+        self.workspace.use_device(choose(there[(place + 1) % len(there)].index))
 
     def _second_window(self) -> None:
-        self.viewer.outputs.open_second()
-        if self.viewer.outputs.second is not None and self.viewer.studio.scene.stereo is None:
+        self.workspace.outputs.open_second()
+        if self.workspace.outputs.second is not None and self.workspace.studio.scene.stereo is None:
             self.scene.stereo_mode(2)  # now that it is known which screen is filled
 
     def _copy(self) -> None:
-        self.viewer.window.clipboard(self.viewer.files.text())
-        self.viewer.studio.tell("the scene is in the clipboard")
+        self.workspace.window.clipboard(self.workspace.files.text())
+        self.workspace.studio.tell("the scene is in the clipboard")
 
     def _pause(self) -> None:
-        session = self.viewer.studio.session
+        session = self.workspace.studio.session
         session.pause(not session.paused)
         paused = session.paused
-        self.viewer.studio.tell(
+        self.workspace.studio.tell(
             "paused" if paused else "gathering samples", holds=lambda: session.paused == paused
         )
 
     def _coarse(self) -> None:
-        settings = replace(self.viewer.settings, coarse=not self.viewer.settings.coarse)
-        self.viewer.set_settings(settings)
-        self.viewer.studio.tell(
+        settings = replace(self.workspace.settings, coarse=not self.workspace.settings.coarse)
+        self.workspace.set_settings(settings)
+        self.workspace.studio.tell(
             "moving pictures may be coarse" if settings.coarse else "moving pictures are never coarse"
         )
 
     def _orbit_style(self) -> None:
-        free = self.viewer.settings.orbit == "free"
-        self.viewer.set_settings(replace(self.viewer.settings, orbit="turntable" if free else "free"))
-        self.viewer.studio.tell(f"orbit: {self.viewer.settings.orbit}")
+        free = self.workspace.settings.orbit == "free"
+        self.workspace.set_settings(replace(self.workspace.settings, orbit="turntable" if free else "free"))
+        self.workspace.studio.tell(f"orbit: {self.workspace.settings.orbit}")
 
     def _chart(self) -> None:
         self.chart_shown = not self.chart_shown

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,11 +16,13 @@ from clfractal.viewer.autosave import Autosave, Recovered
 from clfractal.viewer.options import Options
 from clfractal.viewer.reloading import Reloading, loaded_again
 from clfractal.viewer.saving import save_scene, scene_text
-from clfractal.viewer.shots import Shots, free_name
+from clfractal.viewer.shots import Drawn, Shots, free_name
 from clfractal.viewer.sources import SceneSource, is_protected, open_source, suggested_name
 
 if TYPE_CHECKING:
-    from clfractal.viewer.app import Viewer
+    from clfractal.viewer.outputs import Outputs
+    from clfractal.viewer.settings import Settings
+    from clfractal.viewer.studio import Studio
 
 _FIRST_SCENE = "mandelbulb.yaml"
 _STEREO_WORDS = {"off": None, "none": None}
@@ -41,7 +44,11 @@ class Files:
         self.remarks: list[str] = []
         self.recovered: list[Recovered] = []
         self.wanted: Path | None = None
-        self._viewer: Viewer | None = None
+        self._studio: Studio | None = None
+        self._outputs: Outputs | None = None
+        self._parts: set[str] = set()  # of the window that are open
+        self._set_title: Callable[[str], None] = lambda title: None
+        self._left = False
         self._autosave = Autosave()
         self._autosaved = 0.0
         self._kept: Scene | None = None
@@ -53,10 +60,15 @@ class Files:
                 check_output(path, kinds)
 
     @property
-    def viewer(self) -> Viewer:
-        """The window, once it is there."""
-        assert self._viewer is not None
-        return self._viewer
+    def studio(self) -> Studio:
+        """The window's, once it is there."""
+        assert self._studio is not None
+        return self._studio
+
+    @property
+    def finished(self) -> bool:
+        """Whether the window is to close."""
+        return self._left or self._shots.finished
 
     # Opening
 
@@ -78,18 +90,24 @@ class Files:
         stereo = self._stereo
         return scene if stereo is None else _with_stereo(scene, stereo)
 
-    def attach(self, viewer: Viewer) -> None:
-        """The window is there."""
-        self._viewer = viewer
-        viewer.ui.memory["files"] = self
+    def attach(
+        self, studio: Studio, outputs: Outputs, parts: set[str], set_title: Callable[[str], None]
+    ) -> None:
+        """The window is there.
+
+        Args:
+            parts: names of its parts that are open; see `Ui.show`.
+            set_title: gives it a title.
+        """
+        self._studio, self._outputs, self._parts, self._set_title = studio, outputs, parts, set_title
         if self.source.loaded is not None:
-            viewer.studio.saved = self.source.loaded
-        viewer.studio.shared_in_text = lambda: self.source.shared
-        self._kept = viewer.studio.document
+            studio.saved = self.source.loaded
+        studio.shared_in_text = lambda: self.source.shared
+        self._kept = studio.document
         self._title()
         self._look_for_kept()
         if self.options.scene is None and self.options.shot is None:
-            viewer.ui.show.add("gallery")
+            parts.add("gallery")
 
     def open(self, path: Path, *, sure: bool = False) -> None:
         """Shows another scene; asks first if the present one has unsaved changes.
@@ -100,21 +118,21 @@ class Files:
         Raises:
             ClfractalError: it is wrong; the present one stays.
         """
-        if self.viewer.studio.unsaved and not sure:
+        if self.studio.unsaved and not sure:
             self.wanted = path
-            self.viewer.ui.show.add("replace")
+            self._parts.add("replace")
             return
         source = open_source(path)
         scene = source.loaded or load_scene(path, posed=False)
         self.take(source, scene, saved=scene)
         self._look_for_kept()
-        self.viewer.studio.tell(f"opened {path.name}")
+        self.studio.tell(f"opened {path.name}")
 
     def take(self, source: SceneSource, scene: Scene, *, saved: Scene | None = None) -> None:
         """Shows a scene that was loaded; `saved`: what its file has, if that is another."""
         self.source = source
         self._overrides, self._stereo = (), None
-        studio = self.viewer.studio
+        studio = self.studio
         studio.open(scene)
         if saved is not None:
             studio.saved = studio.opened = saved
@@ -125,12 +143,12 @@ class Files:
 
     def reload(self) -> None:
         """Loads the scene's file again, also when it did not change; see `Reloading`."""
-        self.source = self._reloading.reload(self.source, self.viewer.studio)
+        self.source = self._reloading.reload(self.source, self.studio)
 
     @property
     def offered(self) -> list[Recovered]:
         """Unsaved changes to this scene that are offered now, the newest first: never over a projector's picture."""
-        return [] if self.viewer.outputs.fills_screens else self.recovered
+        return [] if self._outputs is not None and self._outputs.fills_screens else self.recovered
 
     def _look_for_kept(self) -> None:
         """Looks for unsaved changes to the scene that was opened; those to other scenes wait until these are opened."""
@@ -162,7 +180,7 @@ class Files:
 
     def text(self) -> str:
         """The scene as YAML."""
-        return scene_text(self.source, self.viewer.studio.document, self.viewer.studio.formula_texts)
+        return scene_text(self.source, self.studio.document, self.studio.formula_texts)
 
     @property
     def suggestion(self) -> Path:
@@ -179,7 +197,7 @@ class Files:
         if target is None and self.source.path is not None and not is_protected(self.source.path):
             target = self.source.path
         if target is None:
-            self.viewer.ui.show.add("save")
+            self._parts.add("save")
         else:
             self.save_as(target)
 
@@ -189,7 +207,7 @@ class Files:
         Raises:
             FileError: it is protected, cannot be written, or has changed on the disk since it was read.
         """
-        studio = self.viewer.studio
+        studio = self.studio
         scene = studio.document
         self.source = save_scene(
             self.source, scene, target, even_if_changed=even_if_changed, texts=studio.formula_texts
@@ -210,30 +228,31 @@ class Files:
     def export(self) -> None:
         """The picture with all channels, at the window's size, as EXR beside the scene."""
         target = free_name(self.source, "exr")
-        still = self.viewer.studio.render_still((target,))
-        self.viewer.studio.tell(
-            f"rendering {target.name} in the background", holds=lambda: not still.finished
-        )
+        still = self.studio.render_still((target,))
+        self.studio.tell(f"rendering {target.name} in the background", holds=lambda: not still.finished)
 
     # Again and again
 
-    def tick(self, now: float) -> None:
-        """Looks after the file on the disk and the safety copy."""
-        viewer = self.viewer
-        settings, studio = viewer.settings, viewer.studio
+    def tick(self, now: float, settings: Settings, *, dragging: bool, played: bool) -> None:
+        """Looks after the file on the disk and the safety copy; leaves when a recording is played.
+
+        Args:
+            dragging: whether the scene changes with the pointer right now.
+            played: whether nothing of a recording is left.
+        """
+        studio = self.studio
         if settings.watch:
             self.source = self._reloading.look(self.source, studio)
         every = settings.autosave
         if every and now - self._autosaved >= every:
             self._autosaved = now
             document = studio.document
-            if document is not self._kept and studio.edited and not viewer.controls.dragging:
+            if document is not self._kept and studio.edited and not dragging:
                 self._kept = document
                 self._autosave.write(self.source, document, studio.formula_texts)
         self._title()
-        played = self.options.play is not None and viewer.inputs.played
-        if played and self.options.shot is None and studio.session.idle:
-            viewer.finished = True
+        if self.options.play is not None and played and self.options.shot is None and studio.session.idle:
+            self.leave()
 
     @property
     def patience(self) -> float:
@@ -242,24 +261,24 @@ class Files:
 
     def ask_to_close(self) -> None:
         """Closes the window, or asks first if something is unsaved; asked while it asks, it closes."""
-        shown = self.viewer.ui.show
-        if self.viewer.studio.unsaved and self.options.shot is None and "close" not in shown:
+        shown = self._parts
+        if self.studio.unsaved and self.options.shot is None and "close" not in shown:
             shown.add("close")
         else:
             self.leave()
 
     def leave(self) -> None:
         """Closes the window; unsaved changes are given up."""
-        self.viewer.finished = True
+        self._left = True
 
-    def after_draw(self) -> None:
-        """Takes screenshots of what was drawn and not yet shown."""
-        self._shots.after_draw(self.viewer)
+    def after_draw(self, drawn: Drawn) -> bool:
+        """Takes screenshots of what was drawn and not yet shown; whether one waits for another frame."""
+        return self._shots.after_draw(drawn, self.studio)
 
     def keep(self) -> None:
         """The window ends without being closed: what is unsaved is offered at the next start."""
-        if self._viewer is not None and self.options.shot is None and self.viewer.studio.edited:
-            self._autosave.write(self.source, self.viewer.studio.document, self.viewer.studio.formula_texts)
+        if self._studio is not None and self.options.shot is None and self.studio.edited:
+            self._autosave.write(self.source, self.studio.document, self.studio.formula_texts)
             self._autosave.release()
 
     def close(self) -> None:
@@ -268,14 +287,11 @@ class Files:
         self._autosave.close()
 
     def _title(self) -> None:
-        viewer = self._viewer
-        if viewer is None:
-            return
         name = self.source.path.name if self.source.path is not None else "new scene"
-        text = f"{name}{' *' if viewer.studio.unsaved else ''}"
+        text = f"{name}{' *' if self.studio.unsaved else ''}"
         if text != self._titled:
             self._titled = text
-            viewer.window.title(text)
+            self._set_title(text)
 
     _titled = ""
 

@@ -3,20 +3,18 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError
 from clfractal.viewer import window
-from clfractal.viewer.deeds import HELD
+from clfractal.viewer.deeds import HELD, Deeds
 from clfractal.viewer.flying import Key
 from clfractal.viewer.keys import KEYS, PRINTABLE, Context, KeyEvent
 from clfractal.viewer.panels import keyboard
 from clfractal.viewer.recording import Event, Player, Recorder, Recording
-
-if TYPE_CHECKING:
-    from clfractal.viewer.app import Viewer
+from clfractal.viewer.workspace import Workspace
 
 RELEASE, PRESS, REPEAT = 0, 1, 2
 # Degrees that the head turns for a pixel of the mouse.
@@ -44,26 +42,22 @@ class Inputs:
 
     Args:
         recording: events to play; None: none.
-
-    Attributes:
-        pointer: framebuffer pixels from the window's top left.
     """
 
-    def __init__(self, viewer: Viewer, recording: Recording | None) -> None:
-        self.viewer = viewer
-        self.pointer = (-1.0, -1.0)
+    def __init__(self, workspace: Workspace, deeds: Deeds, recording: Recording | None) -> None:
+        self.workspace, self.deeds = workspace, deeds
         self._before: tuple[float, float] | None = None
         self._held: dict[int, Key] = {}
         self._player: Player | None = None
         self._recorder: Recorder | None = None
         # Recordings count from the first picture on: what a pointer does depends on what is under it.
         self._start: float | None = None
-        options = viewer.options
-        viewer.ui.keys.layout = window.layout(PRINTABLE)
+        options = workspace.options
+        workspace.ui.keys.layout = window.layout(PRINTABLE)
         if recording is not None:
             self._player = Player(recording)
         if options.record is not None:
-            self._recorder = Recorder(options.record, viewer.window.size)
+            self._recorder = Recorder(options.record, workspace.window.size)
 
     @property
     def next_due(self) -> float | None:
@@ -79,13 +73,13 @@ class Inputs:
 
     def play(self, now: float) -> None:
         """Queues the events of a recording whose time has come."""
-        if self._start is None and self.viewer.surface.shown is not None:
+        if self._start is None and self.workspace.surface.shown is not None:
             self._start = now
         if self._player is not None and self._start is not None:
             for event in self._player.due(now - self._start):
                 # The window has its own size now.
                 if event.kind != "resize":
-                    self.viewer.events.append(event)
+                    self.workspace.events.append(event)
 
     def close(self) -> None:
         """Ends a recording."""
@@ -94,92 +88,92 @@ class Inputs:
 
     def handle(self, event: Event, now: float) -> None:
         """One event."""
-        viewer = self.viewer
+        work = self.workspace
         if self._recorder is not None and event.kind in _RECORDED:
             self._recorder.add(event, now - self._start if self._start is not None else 0.0)
-        before = viewer.studio.session.newest
+        before = work.studio.session.newest
         values: Any = event.values
         handler = getattr(self, f"_{event.kind}", None)
         if handler is not None:
             try:
                 handler(now, *values)
             except ClfractalError as error:
-                viewer.studio.tell(str(error), wrong=True)
-        after = viewer.studio.session.newest
+                work.studio.tell(str(error), wrong=True)
+        after = work.studio.session.newest
         if after != before:
-            viewer.meter.asked(after, now)
+            work.meter.asked(after, now)
 
     def _move(self, now: float, x: float, y: float) -> None:
-        viewer = self.viewer
-        size, framebuffer = viewer.window.size, viewer.window.framebuffer
-        self.pointer = (
+        work = self.workspace
+        size, framebuffer = work.window.size, work.window.framebuffer
+        self.workspace.pointer = (
             x * framebuffer[0] / max(size[0], 1),
             y * framebuffer[1] / max(size[1], 1),
         )
-        if viewer.deeds.flying:
+        if self.deeds.flying:
             if self._before is not None:
                 dx, dy = x - self._before[0], y - self._before[1]
-                viewer.motion.turn(_LOOK * dx * viewer.settings.mouse, _LOOK * dy * viewer.settings.mouse)
+                work.motion.turn(_LOOK * dx * work.settings.mouse, _LOOK * dy * work.settings.mouse)
             self._before = (x, y)
             return
         self._before = None
-        across, down = viewer.places.to_ui(*self.pointer)
+        across, down = work.places.to_ui(*self.workspace.pointer)
         io = imgui.get_io()
-        io.add_mouse_pos_event(across / viewer.ui.scale, down / viewer.ui.scale)
-        if viewer.controls.dragging:
-            viewer.controls.move(self._in_picture())
+        io.add_mouse_pos_event(across / work.ui.scale, down / work.ui.scale)
+        if work.controls.dragging:
+            work.controls.move(self._in_picture())
 
     def _leave(self, now: float) -> None:
-        if not self.viewer.controls.dragging:
+        if not self.workspace.controls.dragging:
             imgui.get_io().add_mouse_pos_event(-1e6, -1e6)
 
     def _button(self, now: float, button: int, action: int, mods: int) -> None:
-        viewer, io = self.viewer, imgui.get_io()
-        if action == RELEASE and viewer.controls.dragging:
-            viewer.controls.release(self._in_picture())
+        work, io = self.workspace, imgui.get_io()
+        if action == RELEASE and work.controls.dragging:
+            work.controls.release(self._in_picture())
         # Panels see every release, and what was not pressed in the picture.
-        over_panels = io.want_capture_mouse and not viewer.deeds.flying
+        over_panels = io.want_capture_mouse and not self.deeds.flying
         if 0 <= button < 5:
             io.add_mouse_button_event(button, action == PRESS)
-        if action == PRESS and not over_panels and not viewer.deeds.flying:
+        if action == PRESS and not over_panels and not self.deeds.flying:
             imgui.set_window_focus(None)
-            keyboard.leave(viewer.ui)
-            aim = viewer.aim_at(*self.pointer)
-            viewer.controls.press(button, mods, self._in_picture(), aim, now)
+            keyboard.leave(work.ui)
+            aim = work.aim_at(*self.workspace.pointer)
+            work.controls.press(button, mods, self._in_picture(), aim, now)
 
     def _scroll(self, now: float, dx: float, dy: float) -> None:
-        viewer, io = self.viewer, imgui.get_io()
-        if viewer.deeds.flying:
-            viewer.motion.fly.faster(dy)
+        work, io = self.workspace, imgui.get_io()
+        if self.deeds.flying:
+            work.motion.fly.faster(dy)
             return
         if io.want_capture_mouse:
             io.add_mouse_wheel_event(dx, dy)
             return
-        viewer.controls.wheel(dy, _mods(), viewer.aim_at(*self.pointer), now)
+        work.controls.wheel(dy, _mods(), work.aim_at(*self.workspace.pointer), now)
 
     def _key(self, now: float, key: int, scancode: int, action: int, mods: int) -> None:
-        viewer, io = self.viewer, imgui.get_io()
+        work, io = self.workspace, imgui.get_io()
         name = window.key_name(key, scancode)
         # Dear ImGui's own keys (Ctrl+A, Ctrl+C) are by what is printed, too.
         typed = KEYS.get(name.upper(), key) if name is not None else key
-        viewer.renderer.keyboard_callback(viewer.window.handle, typed, scancode, action, mods)
+        work.renderer.keyboard_callback(work.window.handle, typed, scancode, action, mods)
         if action == RELEASE:
             held = self._held.pop(key, None)
             if held is not None:
-                viewer.motion.keys.discard(held)
+                work.motion.keys.discard(held)
             return
-        typing = io.want_text_input or keyboard.inside(viewer.ui)
-        context: Context = "text" if typing else "fly" if viewer.deeds.flying else "picture"
-        viewer.ui.keys.layout = layout = window.layout(PRINTABLE)
+        typing = io.want_text_input or keyboard.inside(work.ui)
+        context: Context = "text" if typing else "fly" if self.deeds.flying else "picture"
+        work.ui.keys.layout = layout = window.layout(PRINTABLE)
         event = KeyEvent(key, scancode, mods, name, frozenset(map(str.lower, layout.values())))
-        found = viewer.ui.keys.matches(event, context)
+        found = work.ui.keys.matches(event, context)
         if found is None:
             return
         if found.name in HELD:
             self._held[key] = HELD[found.name]
-            viewer.motion.keys.add(HELD[found.name])
+            work.motion.keys.add(HELD[found.name])
         elif action == PRESS or found.name.startswith(_REPEATED):
-            viewer.act(found.name)
+            work.act(found.name)
 
     def _char(self, now: float, code: int) -> None:
         if 0 < code < 0x110000:
@@ -189,19 +183,19 @@ class Inputs:
         imgui.get_io().add_focus_event(bool(focused))
         if not focused:
             self._held.clear()
-            self.viewer.motion.keys.clear()
-            self.viewer.motion.fly.stop()
+            self.workspace.motion.keys.clear()
+            self.workspace.motion.fly.stop()
 
     def _drop(self, now: float, *paths: str) -> None:
         if paths:
-            self.viewer.act(f"open:{paths[0]}")
+            self.workspace.act(f"open:{paths[0]}")
 
     def _in_picture(self) -> tuple[float, float]:
-        viewer = self.viewer
-        size = viewer.surface.size
+        work = self.workspace
+        size = work.surface.size
         if 0 in size:
-            return self.pointer
-        x, y = viewer.outputs.to_picture(*self.pointer, size)
+            return self.workspace.pointer
+        x, y = work.outputs.to_picture(*self.workspace.pointer, size)
         return (x, y) if math.isfinite(x) and math.isfinite(y) else (0.0, 0.0)
 
 

@@ -17,7 +17,6 @@ from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.motion import Motion
-from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
 
 STEREO_MODES: tuple[Mode | None, ...] = (
@@ -57,11 +56,10 @@ class SceneDeeds:
         studio: Studio,
         controls: Controls,
         motion: Motion,
-        settings: Settings,
         aim: Callable[[], Aim | None],
         now: Callable[[], float],
     ) -> None:
-        self.studio, self.controls, self.motion, self.settings = studio, controls, motion, settings
+        self.studio, self.controls, self.motion = studio, controls, motion
         self.aim, self.now = aim, now
         self.first_stereo: Callable[[Mode], dict[str, Any]] = lambda mode: {}
         self._perspective: PerspectiveCamera | None = None
@@ -160,7 +158,7 @@ class SceneDeeds:
     def _orbit(self, dx: float, dy: float) -> None:
         camera = self.motion.target
         size = self.studio.viewport
-        style = self.settings.orbit
+        style = self.controls.settings.orbit
         vertical = self.studio.saved.camera.up if style == "turntable" else None
         aim = None if self.motion.active else self.aim()
         if aim is not None and aim.camera_path == "camera":

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,10 +18,27 @@ from clfractal.viewer.own_files import is_own
 from clfractal.viewer.sources import SceneSource
 
 if TYPE_CHECKING:
-    from clfractal.viewer.app import Viewer
+    from clfractal.viewer.display import Shown
+    from clfractal.viewer.studio import Studio
 
 _STILL_FRAMES = 4
 """Panels need a few frames to find their sizes."""
+
+
+@dataclass(frozen=True, slots=True)
+class Drawn:
+    """A frame of the window that is drawn and not yet swapped in.
+
+    Attributes:
+        shown: the picture in it; None before the first one.
+        still: whether nothing moves by itself, and nothing of a recording is left to play.
+        whole, picture: read the pixels of all of it, and of the picture without what lies over it.
+    """
+
+    shown: Shown | None
+    still: bool
+    whole: Callable[[], Any]
+    picture: Callable[[], Any]
 
 
 class Shots:
@@ -27,10 +46,13 @@ class Shots:
 
     Args:
         wanted: the file of `--shot`; None: none.
+
+    Attributes:
+        finished: whether that file is written.
     """
 
     def __init__(self, wanted: Path | None) -> None:
-        self.wanted = wanted
+        self.wanted, self.finished = wanted, False
         self._next: list[tuple[Path, bool]] = []
         self._ready = 0
 
@@ -40,8 +62,8 @@ class Shots:
         taken = [path for path, _ in self._next]
         self._next.append((free_name(source, "png", taken), panels))
 
-    def after_draw(self, viewer: Viewer) -> None:
-        """Writes what is wanted of the frame that was drawn.
+    def after_draw(self, drawn: Drawn, studio: Studio) -> bool:
+        """Writes what is wanted of a frame; whether another one is to be drawn for what `--shot` waits for.
 
         Raises:
             ClfractalError: what `--shot` waits for cannot be rendered or written.
@@ -49,31 +71,28 @@ class Shots:
         wanted, self._next = self._next, []
         for target, panels in wanted:
             try:
-                pixels = viewer.outputs.read() if panels else viewer.picture_alone()
-                write_shot(target, pixels, viewer.studio.shown_scene)
-                viewer.studio.tell(f"saved {_shown(target)}")
+                write_shot(target, drawn.whole() if panels else drawn.picture(), studio.shown_scene)
+                studio.tell(f"saved {_shown(target)}")
             except ClfractalError as error:
-                viewer.studio.tell(str(error), wrong=True)
-        if self.wanted is not None:
-            self._finished(viewer, self.wanted)
+                studio.tell(str(error), wrong=True)
+        return self.wanted is not None and self._waits(drawn, studio, self.wanted)
 
-    def _finished(self, viewer: Viewer, target: Path) -> None:
-        """Writes `--shot`'s file and closes the window, as soon as the picture is finished."""
-        shown, session = viewer.surface.shown, viewer.studio.session
+    def _waits(self, drawn: Drawn, studio: Studio, target: Path) -> bool:
+        """Writes `--shot`'s file as soon as the picture is finished; whether panels need another frame before."""
+        shown, session = drawn.shown, studio.session
         if session.problem is not None and session.idle:
-            viewer.finished = True
             raise session.problem
         settled = shown is not None and shown.frame.finished and shown.frame.request == session.newest
-        current = settled and shown is not None and shown.look == viewer.studio.look
-        if not (current and viewer.inputs.played and not viewer.motion.active and session.idle):
+        current = settled and shown is not None and shown.look == studio.look
+        if not (current and drawn.still and session.idle):
             self._ready = 0
-            return
+            return False
         self._ready += 1
         if self._ready < _STILL_FRAMES:
-            viewer.redraw()
-            return
-        write_shot(target, viewer.outputs.read(), viewer.studio.shown_scene)
-        viewer.finished = True
+            return True
+        write_shot(target, drawn.whole(), studio.shown_scene)
+        self.finished = True
+        return False
 
 
 def free_name(source: SceneSource, ending: str, taken: list[Path] | None = None) -> Path:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
-import clfractal
+from clfractal import resources
 from clfractal.device.select import DeviceInfo
 from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
@@ -194,7 +194,7 @@ class Job:
         devices = [self.device, *(kind.device for kind in self.others)]
         return {
             "scene": write_document(self.resolved()),
-            "version": clfractal.__version__,
+            "version": resources.__version__,
             "device": "; ".join(dict.fromkeys(device.name for device in devices)),
             "platform": "; ".join(dict.fromkeys(f"{each.platform}, {each.version}" for each in devices)),
             "precision": self.precision,
@@ -265,7 +265,7 @@ class Job:
             # Only where there are some: work in progress of older versions stays valid.
             **({"textures": textures} if textures else {}),
             **({"grids": grids} if grids else {}),
-            "version": clfractal.__version__,
+            "version": resources.__version__,
             "device": self.device.name,
             "driver": self.device.key,
             "lanes": view.plan.lanes,

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import clfractal
+from clfractal import resources
 from clfractal.files import memory
 from clfractal.files.atomic import atomic_writer
 from clfractal.optics.view import scene_view
@@ -46,7 +46,7 @@ def statistics(
         "device": info.name,
         "platform": info.platform,
         "driver": info.driver,
-        "version": clfractal.__version__,
+        "version": resources.__version__,
         "precision": job.precision,
         "lanes": job.lanes,
         "samples": job.samples,

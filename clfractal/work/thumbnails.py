@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-import clfractal
+from clfractal import resources
 from clfractal.device import cache
 from clfractal.errors import ClfractalError
 from clfractal.files.png import read_png_pixels, write_png_pixels
@@ -60,7 +60,7 @@ def key_of(scene: Scene, device: str) -> str:
         scene: as `shown_scene` gives it.
         device: key of the device that renders it (`DeviceInfo.key`).
     """
-    return cache.key_of("thumbnail", dump_scene(scene), clfractal.__version__, device, SIZE)
+    return cache.key_of("thumbnail", dump_scene(scene), resources.__version__, device, SIZE)
 
 
 def load(key: str) -> Pixels | None:

@@ -212,7 +212,7 @@ def test_jobs_that_nobody_executes_are_left(job: Job) -> None:
         begin=begun.append,
         leave=left.append,
     )
-    engine = ClusterEngine(cluster)  # type: ignore[arg-type]
+    engine = ClusterEngine(cluster)
     jobs = engine.in_order([job.scene] * 5, lambda _: True)
     taken = [next(jobs)[0] for _ in range(2)]
     jobs.close()
@@ -235,7 +235,7 @@ def test_all_frames_of_a_film_have_the_lanes_of_the_first(job: Job) -> None:
         unpacked=lambda *_: next(answers),
         others=lambda: (2, 0, []),
     )
-    engine = ClusterEngine(cluster)  # type: ignore[arg-type]
+    engine = ClusterEngine(cluster)
     assert [engine.prepare(job.scene).lanes for _ in decided] == [16, 16, 4, 16, 4]
 
 

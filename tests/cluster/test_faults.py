@@ -227,8 +227,8 @@ def _other_program(where: Path) -> None:
     for name in ("clfractal", "kernels", "scenes"):
         if (home / name).exists():
             shutil.copytree(home / name, where / name, ignore=shutil.ignore_patterns("__pycache__", "*.exr"))
-    init = where / "clfractal/__init__.py"
-    init.write_text(init.read_text().replace(f'"{clfractal.__version__}"', '"9.9.9"'))
+    home = where / "clfractal/resources.py"
+    home.write_text(home.read_text().replace(f'"{clfractal.__version__}"', '"9.9.9"'))
 
 
 WITHOUT_FLOAT64 = """

@@ -87,6 +87,7 @@ clfractal/work/var*: work/variations vary_shell
 clfractal/work/*: work/ render/passes resume comfort
 clfractal/viewer/panels/*: viewer/panels viewer/widgets viewer/formula_panels viewer/golden_panels
 clfractal/viewer/app.py: window/
+clfractal/viewer/workspace.py: window/
 clfractal/viewer/window.py: window/
 clfractal/viewer/gl.py: window/
 clfractal/viewer/surface.py: window/

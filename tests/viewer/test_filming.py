@@ -316,7 +316,7 @@ def test_the_ways_of_stereo_go_round_past_off() -> None:
     studio = studio_of(LIT, 0)
     motion = Motion(studio)
     controls = Controls(studio, Settings(), motion)
-    deeds = SceneDeeds(studio, controls, motion, Settings(), lambda: None, lambda: 0.0)
+    deeds = SceneDeeds(studio, controls, motion, lambda: None, lambda: 0.0)
     modes = set()
     for _ in STEREO_MODES:
         deeds.stereo_mode(1)

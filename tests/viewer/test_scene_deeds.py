@@ -44,9 +44,7 @@ class Desk:
         self.controls = Controls(self.studio, Settings(), self.motion)
         self.now = 0.0
         self.hit: float = 2.0
-        self.deeds = SceneDeeds(
-            self.studio, self.controls, self.motion, Settings(), self.aim, lambda: self.now
-        )
+        self.deeds = SceneDeeds(self.studio, self.controls, self.motion, self.aim, lambda: self.now)
 
     def aim(self) -> Aim:
         """What is in the middle of the picture: at a depth of `hit`."""

@@ -71,7 +71,7 @@ class Desk:
     def keys(self, aim: Callable[[], Aim | None]) -> SceneDeeds:
         motion = Motion(self.studio)
         controls = Controls(self.studio, Settings(), motion)
-        return SceneDeeds(self.studio, controls, motion, Settings(), aim, lambda: 0.0)
+        return SceneDeeds(self.studio, controls, motion, aim, lambda: 0.0)
 
 
 @pytest.fixture
