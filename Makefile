@@ -2,7 +2,7 @@
 #
 #   make demo          render a first picture
 #   make test          all tests, on the installed program
-#   make lint          style, types, import directions: with exact versions of tools, so that it says the same everywhere
+#   make lint          style, types, import directions, what nothing uses: with exact versions of tools, so that it says the same everywhere
 #   make view          the window (needs a display)
 #   make window        tests of the window, on a screen of their own (needs Xvfb, xdotool, openbox and Mesa)
 #   make cluster       tests of the cluster, with schedulers and workers that are killed (ARGUMENTS="-k film")
@@ -90,6 +90,7 @@ lint: $(LINT)/.installed
 	$(LINT)/bin/mypy --strict --platform win32 clfractal
 	$(LINT)/bin/mypy --strict --platform darwin clfractal
 	$(LINT)/bin/lint-imports
+	$(LINT)/bin/vulture
 
 locks: $(LOWEST)/bin/python
 	$(LOWEST)/bin/python -m pip install --quiet --disable-pip-version-check 'uv>=0.5'

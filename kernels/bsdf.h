@@ -35,7 +35,6 @@ typedef struct {
 
 INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
 INLINE real luminance(color c) { return R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b; }
-INLINE color color_less(color c) { return color_of(R(1.0) - c.r, R(1.0) - c.g, R(1.0) - c.b); }
 
 // What a body's boundary lets in and out.
 INLINE real through_boundary(albedo o, albedo i) {

@@ -25,7 +25,7 @@ camera: {position: [0, -3, 0]}
 renderer: {samples: 2}
 stereo: {mode: split, separation: 0.3}
 """
-TILES, OF_AN_EYE = 18, 9
+TILES = 18
 
 
 @pytest.fixture

@@ -25,7 +25,6 @@ import pyopencl as cl
 from clfractal.device.select import Device, Properties, status_name
 from clfractal.errors import DeviceError
 
-SHARING = "cl_khr_gl_sharing"
 FENCES = "cl_khr_gl_event"
 
 # Numbers of the standard that pyopencl has only if it was built with OpenGL.

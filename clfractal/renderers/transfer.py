@@ -27,9 +27,9 @@ def extinction(values: npt.NDArray[np.float64], transfer: Transfer) -> npt.NDArr
 
 
 def medium_table(transfer: Transfer, limits: tuple[float, float], color: Vector) -> Floats:
-    """What paths need of values between `limits`; shape (TRANSFER_SIZE, `transfer_columns`).
+    """What paths need of values between `limits`; shape (TRANSFER_SIZE, 4 or 7).
 
-    The columns are the extinction per side of a voxel, the colour, and the light that a side adds.
+    The columns are the extinction per side of a voxel, the colour, and the light that a side adds, if anything shines.
 
     Args:
         color: where the transfer function has none, linear Rec. 709.
@@ -48,11 +48,6 @@ def value_limits(transfer: Transfer, otherwise: Sequence[float]) -> tuple[float,
     stops = [stop.at for part in (transfer.opacity, transfer.color, transfer.emission) for stop in part or ()]
     low, high = min(stops or otherwise), max(stops or otherwise)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def transfer_columns(transfer: Transfer) -> int:
-    """Numbers of the transfer table for one value."""
-    return 4 if transfer.emission is None else 7
 
 
 def mixed(

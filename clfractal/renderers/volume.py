@@ -422,7 +422,7 @@ def value_range(scene: Scene, grid: Grid) -> tuple[float, float]:
 
 
 def transfer_table(scene: Scene, limits: tuple[float, float]) -> Floats:
-    """What a kernel needs of values between `limits`; shape (TRANSFER_SIZE, `transfer_columns`).
+    """What a kernel needs of values between `limits`; shape (TRANSFER_SIZE, 4 or 7).
 
     For paths the columns are the extinction per side of a voxel, the colour, and the light that a side adds. Else they
     are the opacity of one step, the colour (linear), and the light that one step adds, if anything shines. With

@@ -62,11 +62,6 @@ def aerosol_phase(cosine: Reals) -> Reals:
     return found
 
 
-def densities(height: Doubles) -> Doubles:
-    """Of molecules, aerosol and ozone, each as a part of its whole column, per km; shape (..., 3)."""
-    return np.stack([each.copy() for each in _densities(height)], axis=-1).astype(np.float64)
-
-
 def columns(radius: Doubles, mu: Doubles) -> Doubles:
     """How much of each lies on a ray to the air's end, 1 being the whole vertical column; shape (..., 3).
 

@@ -43,7 +43,6 @@ class PathLighting(Section):
     )
 
 
-AnyLighting = DirectLighting | PathLighting
 Lighting = Annotated[
     Annotated[DirectLighting, Tag("direct")] | Annotated[PathLighting, Tag("path")],
     chosen_by("mode", "direct"),

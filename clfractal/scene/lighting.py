@@ -213,7 +213,6 @@ class SetLight(LightBase):
         return self.rays if self.rays is not None else 8
 
 
-AreaLight = SphereLight | RectangleLight
 PlacedLight = PointLight | SpotLight | SphereLight | RectangleLight
 Light = Annotated[
     Annotated[DirectionalLight, Tag("directional")]

@@ -97,10 +97,6 @@ class InFilm(ABC):
         if elsewhere or self.place is None or self.scene is self.place.posed:
             self._pose(saved, self.frame_number)
 
-    def set_document(self, document: Scene) -> None:
-        """Another document in the place of this one, as a step that can be undone; its film is shown where this one was."""
-        self._take(document)
-
     def load_again(self, document: Scene, opened: Scene, saved: Scene) -> None:
         """The same for what was loaded from the scene's file once more; a camera that was moved at a frame stays there.
 

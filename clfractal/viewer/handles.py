@@ -109,20 +109,6 @@ def dragged(
     return light.model_copy(update={"direction": tuple(direction.tolist())})
 
 
-@np.errstate(all="ignore")
-def pushed(light: Light, view: View, factor: float) -> Light:
-    """A point light, farther from the eye (above 1) or nearer by a factor, in its pixel; other lights are unchanged.
-
-    By parallel rays, the depth is scaled.
-    """
-    if not isinstance(light, PlacedLight) or not (isfinite(factor) and factor > 0):
-        return light
-    position = np.array(light.position)
-    depth = float((position - view.origin) @ view.axis)
-    way = position - view.eye if view.eye is not None else depth * view.axis
-    return _placed(light, position + (factor - 1) * way) if depth > 0 else light
-
-
 def focus_at(camera: AnyCamera, depth: float) -> AnyCamera:
     """The camera, focused on the depth of a clicked pixel; unchanged where nothing is, or if its rays are parallel.
 

@@ -91,7 +91,6 @@ class Inputs:
         work = self.workspace
         if self._recorder is not None and event.kind in _RECORDED:
             self._recorder.add(event, now - self._start if self._start is not None else 0.0)
-        before = work.studio.session.newest
         values: Any = event.values
         handler = getattr(self, f"_{event.kind}", None)
         if handler is not None:
@@ -99,9 +98,6 @@ class Inputs:
                 handler(now, *values)
             except ClfractalError as error:
                 work.studio.tell(str(error), wrong=True)
-        after = work.studio.session.newest
-        if after != before:
-            work.meter.asked(after, now)
 
     def _move(self, now: float, x: float, y: float) -> None:
         work = self.workspace

@@ -211,10 +211,6 @@ class KeyMap:
             )
         return found
 
-    def chords_of(self, name: str) -> tuple[Chord, ...]:
-        """The chords of an action."""
-        return self._chords[name]
-
     def changes(self) -> dict[str, list[str]]:
         """What differs from the defaults, as `from_settings` reads it."""
         usual = KeyMap.defaults()

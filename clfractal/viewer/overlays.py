@@ -6,27 +6,24 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.optics.view import View
-from clfractal.scene.plane import Placed
 from clfractal.viewer.pointer import Floats, Size
 
 # The near plane, part of the distance from the eye to the view's plane.
 NEAR = 1e-6
 
 
-def clipped_segments(view: View, segments: npt.ArrayLike, size: Size, margin: float = 0.0) -> Floats:
-    """Segments of space, shape (n, 2, 3), as x, y, x, y in pixels, shape (n, 4); NaN for those that are not visible.
-
-    Args:
-        margin: how far beyond the picture's edge they go, pixels.
-    """
-    return clipped_with_depth(view, segments, size, margin)[0]
-
-
 @np.errstate(all="ignore")
 def clipped_with_depth(
     view: View, segments: npt.ArrayLike, size: Size, margin: float = 0.0
 ) -> tuple[Floats, Floats]:
-    """As `clipped_segments`, and the depths of both ends, shape (n, 2)."""
+    """Segments of space, shape (n, 2, 3), as x, y, x, y in pixels, shape (n, 4); NaN for those that are not visible.
+
+    Args:
+        margin: how far beyond the picture's edge they go, pixels.
+
+    Returns:
+        Them, and the depths of both ends, shape (n, 2).
+    """
     ends = np.asarray(segments, float).reshape(-1, 2, 3)
     width, height = size
     x, y, w = _homogeneous(view, ends, size)
@@ -85,25 +82,6 @@ def hidden(
         behind = _middle_depth(view, depths) * (1 - slack) > surface[row, column]
     found: npt.NDArray[np.bool_] = seen & behind
     return found
-
-
-def plane_outline(plane: Placed) -> Floats:
-    """The four edges of a plane's rectangle: segments, shape (4, 2, 3)."""
-    corners = np.array([plane.at(0, 0), plane.at(1, 0), plane.at(1, 1), plane.at(0, 1)])
-    return np.stack([corners, np.roll(corners, -1, axis=0)], axis=1)
-
-
-def plane_axes(plane: Placed, length: float | None = None) -> Floats:
-    """A plane's side, up and normal from its middle: segments, shape (3, 2, 3).
-
-    Args:
-        length: scene units; None: a quarter of its smaller side.
-    """
-    long = min(plane.width, plane.height) / 4 if length is None else length
-    center = np.array(plane.center)
-    return np.array(
-        [[center, center + long * np.array(axis)] for axis in (plane.side, plane.up, plane.normal)]
-    )
 
 
 def circle(center: npt.ArrayLike, radius: float, axis: npt.ArrayLike, pieces: int = 64) -> Floats:

@@ -13,16 +13,12 @@ import numpy as np
 from pydantic import ValidationError
 
 from clfractal.errors import SceneError
-from clfractal.optics.view import View, plane_view
-from clfractal.scene.checks import MAX_PLANES
-from clfractal.scene.cut_plane import CutPlane
-from clfractal.scene.model import Scene
+from clfractal.optics.view import plane_view
 from clfractal.scene.plane import Axis, Placed, Plane, Transform, moved, rotated, scaled
-from clfractal.viewer.pointer import Size, ray_at
+from clfractal.viewer.pointer import Size
 
 # A plane with more steps than this is written by its middle and normal instead: pointers make a step a frame.
 MOST_STEPS = 16
-MOST_COUNT = 256
 # Corners nearer to each other than this part of their coordinates no longer tell a right angle.
 _LEAST_CORNERS = 1e-9
 # A drag across the picture's smaller side turns by half a turn.
@@ -94,40 +90,6 @@ def tilt(plane: Plane, dx: float, dy: float, size: Size) -> Plane:
     follows a drag by (dx, dy) pixels."""
     part = _DRAG_DEGREES / min(size)
     return rotate(rotate(plane, "up", -dx * part), "side", -dy * part)
-
-
-# By a pointer in the picture of the object
-
-
-@np.errstate(all="ignore")
-def pull(plane: Plane, view: View, start: tuple[float, float], end: tuple[float, float], size: Size) -> Plane:
-    """The plane, moved along its normal so that its middle's normal follows the pointer from `start` to `end`, pixels.
-
-    Where one looks along the normal, the pointer cannot tell how far, and nothing moves.
-    """
-    before, after = (_along_normal(plane.placed, view, *place, size) for place in (start, end))
-    if before is None or after is None:
-        return plane
-    return shift(plane, normal=after - before)
-
-
-# Stacks of parallel planes
-
-
-def restack(scene: Scene, index: int, count: int | None = None, spacing: float | None = None) -> CutPlane:
-    """One of a scene's cut planes with another number or spacing (scene units) of parallel planes.
-
-    The number is at most what the scene's other planes leave room for.
-    """
-    plane = scene.cut_planes[index]
-    others = sum(each.count for number, each in enumerate(scene.cut_planes) if number != index)
-    room = max(min(MAX_PLANES - others, MOST_COUNT), 1)
-    update: dict[str, object] = {}
-    if count is not None:
-        update["count"] = min(max(count, 1), room)
-    if spacing is not None and isfinite(spacing):
-        update["spacing"] = min(max(spacing, -1e6), 1e6)
-    return plane.model_copy(update=update)
 
 
 # Writing a plane with the keys that it had
@@ -220,15 +182,3 @@ def _step(name: str, amount: float) -> Transform:
 def _pixel(plane: Plane, size: Size) -> float:
     """Side of a pixel in the plane's picture, scene units."""
     return plane_view(plane.placed, *size).pixel_size(size[1])
-
-
-def _along_normal(placed: Placed, view: View, x: float, y: float, size: Size) -> float | None:
-    """Where the normal through the plane's middle comes nearest to the ray under the pointer, scene units from the
-    middle; None where both are nearly parallel."""
-    origin, direction = ray_at(view, x, y, size)
-    normal, between = np.array(placed.normal), np.array(placed.center) - origin
-    along = float(normal @ direction)
-    across = 1 - along * along
-    if not across > 1e-6:
-        return None
-    return float(((between @ direction) * along - between @ normal) / across)

@@ -1,4 +1,4 @@
-"""Measures what a user feels: frames a second while something moves, and the time from an input to its picture."""
+"""Measures what a user feels: frames a second while something moves."""
 
 from __future__ import annotations
 
@@ -14,24 +14,12 @@ _WINDOW_SECONDS = 1.0
 
 
 class Meter:
-    """Takes note of inputs, of frames that arrive, and of swaps.
-
-    Attributes:
-        latencies: of the last inputs, seconds from the input to the swap that shows it.
-    """
+    """Takes note of frames that arrive, and of swaps."""
 
     def __init__(self) -> None:
-        self.latencies: deque[float] = deque(maxlen=10_000)
-        self._asked: deque[tuple[int, float]] = deque()
         self._arrived: deque[float] = deque()
-        self._waiting: list[float] = []
         self._depth: tuple[Shown | None, float] = (None, float("inf"))
         self._shown: Shown | None = None
-
-    def asked(self, request: int, now: float) -> None:
-        """An input led to a request of this number."""
-        if not self._asked or self._asked[-1][0] != request:
-            self._asked.append((request, now))
 
     def shown(self, shown: Shown | None, now: float) -> None:
         """A frame has arrived and is drawn next."""
@@ -40,14 +28,9 @@ class Meter:
         if self._shown is None or self._shown.frame is not shown.frame:
             self._arrived.append(now)
         self._shown = shown
-        while self._asked and self._asked[0][0] <= shown.frame.request:
-            # Requests that a newer one has replaced were answered by it.
-            self._waiting.append(self._asked.popleft()[1])
 
     def swapped(self, now: float) -> None:
         """What was drawn is on the screen."""
-        self.latencies.extend(now - asked for asked in self._waiting)
-        self._waiting.clear()
         while self._arrived and now - self._arrived[0] > _WINDOW_SECONDS:
             self._arrived.popleft()
 
@@ -59,7 +42,7 @@ class Meter:
         moving = len(times) > 2 and time.perf_counter() - times[-1] < 0.5
         if moving and times[-1] > times[0]:
             frames = (len(times) - 1) / (times[-1] - times[0])
-        return Speed(frames, self.latencies[-1] if self.latencies else 0.0)
+        return Speed(frames)
 
     def nearest(self, shown: Shown | None) -> float:
         """Depth of the nearest surface in the picture, scene units; infinite if none is in sight."""

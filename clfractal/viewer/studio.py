@@ -15,7 +15,6 @@ from typing import Any
 
 from clfractal.device.select import Device
 from clfractal.errors import ClfractalError
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
@@ -170,16 +169,6 @@ class Studio(InFilm):
         self.region = None
         if scene.animation is None or not self.go_to_frame(0.0):
             self.refresh()
-
-    def open_file(self, path: Path, overrides: tuple[str, ...] = ()) -> bool:
-        """Loads a scene; on a mistake the present one stays, and a message tells what is wrong."""
-        try:
-            scene = load_scene(path, overrides=overrides, posed=False)
-        except ClfractalError as error:
-            self.tell(str(error), wrong=True)
-            return False
-        self.open(scene)
-        return True
 
     def value(self, path: str) -> Any:
         """The plain value at a dotted path."""

@@ -92,7 +92,6 @@ def grid_from_dense(
         cl.enqueue_copy(device.queue, table, entries.reshape(-1))
     stats = GridStats(
         stored_bricks=stored,
-        pool_bytes=sum(buffer.size for buffer in (*pools[0], *pools[1], table)),
         build_ms=built.build_ms,
         store_ms=milliseconds,
         wall_ms=1e3 * (time.perf_counter() - start),

@@ -33,7 +33,6 @@ class GridStats:
         evaluated_voxels: voxels (times their sub-points) whose value was evaluated.
         stored_bricks: bricks with samples of their own.
         solid_bricks: bricks that share the one that is inside as a whole.
-        pool_bytes: memory of samples, normals and table on the device.
         build_ms: compiling, or finding the programs in the cache.
         octree_ms, fill_ms, store_ms, normals_ms: time on the device of each stage; `normals_ms` is of normals
             beyond `gradient`, whose time is part of `store_ms`.
@@ -44,7 +43,6 @@ class GridStats:
     evaluated_voxels: int = 0
     stored_bricks: int = 0
     solid_bricks: int = 0
-    pool_bytes: int = 0
     build_ms: float = 0.0
     octree_ms: float = 0.0
     fill_ms: float = 0.0

@@ -195,7 +195,6 @@ def store(
         stats,
         stored_bricks=count,
         solid_bricks=len(solid),
-        pool_bytes=sum(buffer.size for buffer in (*values, *normals, table)),
         store_ms=milliseconds,
         normals_ms=refining,
     )

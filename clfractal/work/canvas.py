@@ -182,13 +182,6 @@ class Canvas:
         ]
         return parts, event
 
-    def read_depths(self, queue: cl.CommandQueue) -> list[Floats]:
-        """The same, when they are there."""
-        depths, event = self.start_reading_depths(queue)
-        with self.device.failures("reading depths"):
-            event.wait()
-        return depths
-
 
 class CanvasStore:
     """A view's picture on a canvas, as a store for `run`: tiles are on the device already, and only counted here.

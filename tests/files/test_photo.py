@@ -19,7 +19,6 @@ from clfractal.files.srgb import codes, encode, encode8
 
 SCENE = 'version: 1\nformula: {name: hast}  # <a> & "b" ]]>\n# Grüße, 分形 🌀\n\ttab\n'
 TEXTS = {"Software": "clfractal 0.1.0", "clfractal": SCENE, "clfractalDevice": "PoCL", "clfractalTone": "agx"}
-ENDINGS: dict[Format, str] = {"JPEG": ".jpg", "WEBP": ".webp"}
 FORMATS: tuple[Format, ...] = ("JPEG", "WEBP")
 
 Floats = npt.NDArray[np.float32]

@@ -28,12 +28,6 @@ def grid_offsets(side: int) -> Floats:
     return np.array([(right, -below) for below in steps for right in steps])
 
 
-def orthographic_points(offsets: Floats, footprint: float, depths: Floats) -> Floats:
-    """Points (..., count, 3) of parallel rays: offsets (count, 2) in pixels, depths (..., count) in scene units."""
-    places = np.broadcast_to(offsets * footprint, (*depths.shape, 2))
-    return np.concatenate([places, -depths[..., None]], axis=-1)
-
-
 def perspective_points(offsets: Floats, pixel_width: float, depths: Floats) -> Floats:
     """Points (..., count, 3) of rays from the eye; `pixel_width` at distance 1, depths (..., count) along each ray."""
     rays = np.concatenate([offsets * pixel_width, -np.ones((len(offsets), 1))], axis=1)

@@ -27,7 +27,6 @@ from tests.viewer.cameras import (
     orthographic,
     perspective,
     places,
-    plane_of,
     point_light,
 )
 
@@ -133,18 +132,6 @@ def test_a_point_light_moves_in_the_plane_at_its_depth(
     np.testing.assert_allclose(again, end, atol=1e-6)
 
 
-@given(cameras(), places(), numbers(0.1, 50), numbers(0.1, 10))
-def test_a_pushed_point_light_keeps_its_pixel(
-    camera: AnyCamera, place: tuple[float, float], share: float, factor: float
-) -> None:
-    view = camera_view(camera, *SIZE)
-    distance = float(np.linalg.norm(np.array(camera.target) - camera.position))
-    position = point_at(view, *place, SIZE, share * distance)
-    moved = handles.pushed(point_light(position=tuple(position.tolist())), view, factor)
-    assert isinstance(moved, PointLight)
-    assert_same_place(project(view, moved.position, SIZE), (*place, factor * share * distance))
-
-
 def test_a_point_light_behind_the_eye_has_no_handle_and_comes_to_the_scene() -> None:
     view = camera_view(perspective(), *SIZE)
     light = point_light(position=(0.0, -5.0, 0.0))
@@ -152,19 +139,17 @@ def test_a_point_light_behind_the_eye_has_no_handle_and_comes_to_the_scene() -> 
     moved = handles.dragged(light, view, SIZE, 100, 100, BOUNDS)
     assert isinstance(moved, PointLight)
     assert_same_place(project(view, moved.position, SIZE), (100, 100, 3))
-    assert handles.pushed(light, view, 2) == light
 
 
 wild = st.one_of(st.floats(), numbers(-1000, 1000))
 
 
-@given(cameras(), wild, wild, wild, st.booleans(), directions, bounds())
+@given(cameras(), wild, wild, st.booleans(), directions, bounds())
 @settings(max_examples=200)
 def test_every_light_is_valid_wherever_it_is_dragged(
     camera: AnyCamera,
     x: float,
     y: float,
-    factor: float,
     behind: bool,
     vector: tuple[float, float, float],
     ball: handles.Bounds,
@@ -172,7 +157,6 @@ def test_every_light_is_valid_wherever_it_is_dragged(
     view = camera_view(camera, *SIZE)
     for light in (directional(direction=vector), point_light(position=vector)):
         moved = handles.dragged(light, view, SIZE, x, y, ball, behind=behind)
-        moved = handles.pushed(moved, view, factor)
         type(moved).model_validate(moved.model_dump())
 
 
@@ -263,9 +247,9 @@ def test_a_segment_that_passes_the_eye_ends_before_it() -> None:
 
 def test_nothing_and_infinite_segments_are_no_error() -> None:
     view = camera_view(perspective(), *SIZE)
-    assert overlays.clipped_segments(view, np.zeros((0, 2, 3)), SIZE).shape == (0, 4)
+    assert overlays.clipped_with_depth(view, np.zeros((0, 2, 3)), SIZE)[0].shape == (0, 4)
     broken = np.array([[[0, 0, 0], [inf, 0, 0]], [[nan, 0, 0], [0, 0, 1.0]], [[0, 0, 0], [0, 0, 0.1]]])
-    clipped = overlays.clipped_segments(view, broken, SIZE)
+    clipped, _ = overlays.clipped_with_depth(view, broken, SIZE)
     assert np.isnan(clipped[:2]).all()
     assert np.isfinite(clipped[2]).all()
 
@@ -306,22 +290,6 @@ def _depth_on_line(ends: np.ndarray, view: View, place: np.ndarray) -> float:
         x, _, depth = project(view, ends[0] * (1 - part) + ends[1] * part, SIZE)
         low, high = (part, high) if x < place[0] else (low, part)
     return depth
-
-
-@given(st.tuples(*[numbers(-3, 3)] * 3), numbers(0.1, 4), numbers(0.1, 4))
-def test_outlines_and_axes_of_a_plane(
-    center: tuple[float, float, float], width: float, height: float
-) -> None:
-    placed = plane_of(center=center, normal=(0.3, -1.0, 0.55), width=width, height=height).placed
-    outline = overlays.plane_outline(placed)
-    lengths = np.linalg.norm(outline[:, 1] - outline[:, 0], axis=1)
-    np.testing.assert_allclose(lengths, [width, height, width, height], atol=1e-12)
-    np.testing.assert_allclose(outline.mean((0, 1)), center, atol=1e-12)
-    np.testing.assert_allclose(outline[:, 1], np.roll(outline[:, 0], -1, axis=0))
-    axes = overlays.plane_axes(placed, 0.5)
-    np.testing.assert_allclose(
-        (axes[:, 1] - axes[:, 0]) * 2, [placed.side, placed.up, placed.normal], atol=1e-12
-    )
 
 
 @given(st.tuples(*[numbers(-3, 3)] * 3), numbers(0.1, 4), directions)

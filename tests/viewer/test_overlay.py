@@ -73,7 +73,7 @@ def frame(ui: Ui, **changes: Any) -> None:
 
 def test_a_picture_s_figures() -> None:
     ui = ui_of(BULB)
-    ui.speed = Speed(29.6, 0.04, "shared")
+    ui.speed = Speed(29.6, "shared")
     frame(ui)
     found = told(ui)
     assert found["render"] == "2.5 s"
@@ -350,7 +350,7 @@ def test_the_help_has_every_key_and_the_pointer() -> None:
         *dict.fromkeys(action.group for action in ACTIONS.values()),
     ]
     shown = {told for _, rows in blocks for _, told in rows}
-    assert {action.help for name, action in ACTIONS.items() if ui.keys.chords_of(name)} <= shown
+    assert {action.help for name, action in ACTIONS.items() if ui.keys.hint(name)} <= shown
     keys = " ".join(keys for _, rows in blocks for keys, _ in rows)
     for chord in ("F1", "F2", "F11", "Ctrl+S", "Ctrl+Z", "Ctrl+Shift+Z", "Escape"):
         assert chord in keys

@@ -11,8 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.optics.view import camera_view, plane_view
-from clfractal.scene.load import load_scene
+from clfractal.optics.view import plane_view
 from clfractal.scene.plane import Axis, Placed, Plane
 from clfractal.viewer import plane_moves
 from clfractal.viewer.navigation import point_at, project
@@ -20,7 +19,6 @@ from tests.viewer.cameras import (
     SIZE,
     assert_same_pixel,
     numbers,
-    perspective,
     places,
     plane_of,
 )
@@ -194,24 +192,6 @@ def test_what_is_in_front_of_a_plane_follows_a_tilt() -> None:
     assert_same_pixel(down, (SIZE[0] / 2, SIZE[1] / 2 + moved))
 
 
-@given(planes(), numbers(-0.5, 0.5))
-def test_a_plane_is_pulled_along_its_normal(plane: Plane, way: float) -> None:
-    placed = plane.placed
-    view = camera_view(perspective(position=(0.0, -12.0, 5.0)), *SIZE)
-    middle, normal = np.array(placed.center), np.array(placed.normal)
-    start, end = (project(view, middle + amount * normal, SIZE)[:2] for amount in (0.0, way))
-    there = plane_moves.pull(plane, view, start, end, SIZE)
-    looked = middle - view.origin
-    if abs(normal @ looked) < 0.99 * np.linalg.norm(looked):
-        np.testing.assert_allclose(there.placed.center, middle + way * normal, atol=1e-9)
-
-
-def test_a_plane_seen_along_its_normal_cannot_be_pulled() -> None:
-    plane = plane_of(normal=(0.0, -1.0, 0.0))
-    view = camera_view(perspective(), *SIZE)
-    assert plane_moves.pull(plane, view, (320, 180), (320, 150), SIZE) == plane
-
-
 # Keys
 
 
@@ -286,29 +266,6 @@ def test_corners_too_near_to_tell_a_right_angle_become_a_middle_and_a_normal() -
     np.testing.assert_allclose(plane.center, (1.5, 0.05, 0.5), atol=1e-12)
 
 
-# Stacks
-
-
-def test_stacks_have_room_for_the_scenes_other_planes() -> None:
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "hast"},
-            "camera": {},
-            "cut_planes": [{"count": 10, "spacing": 0.2}, {"count": 4}],
-        }
-    )
-    assert plane_moves.restack(scene, 0, 1000).count == 60
-    assert plane_moves.restack(scene, 1, -3).count == 1
-    changed = plane_moves.restack(scene, 0, 12, -0.3)
-    assert (changed.count, changed.spacing) == (12, -0.3)
-    assert plane_moves.restack(scene, 0, spacing=nan) == scene.cut_planes[0]
-    load = scene.model_dump(mode="json")
-    load["formula"] = {"name": "hast"}
-    load["cut_planes"][0] = plane_moves.restack(scene, 0, 1000).model_dump(mode="json")
-    load_scene(load)
-
-
 # Whatever is asked, the plane is valid
 
 wild = st.one_of(st.floats(), st.sampled_from([1e300, -1e300, inf, nan, 1e6]), numbers(-50, 50))
@@ -317,7 +274,6 @@ wild = st.one_of(st.floats(), st.sampled_from([1e300, -1e300, inf, nan, 1e6]), n
 @given(planes(), st.data())
 @settings(max_examples=200)
 def test_every_plane_is_valid_whatever_is_asked(plane: Plane, data: st.DataObject) -> None:
-    view = camera_view(perspective(), *SIZE)
     for _ in range(8):
         a, b, c = (data.draw(wild) for _ in range(3))
         axis = data.draw(st.sampled_from(AXES))
@@ -330,7 +286,6 @@ def test_every_plane_is_valid_whatever_is_asked(plane: Plane, data: st.DataObjec
             "zoom_to": partial(plane_moves.zoom_to, plane, a, b, SIZE, c),
             "spin": partial(plane_moves.spin, plane, (a, b), (b, c), SIZE),
             "tilt": partial(plane_moves.tilt, plane, a, b, SIZE),
-            "pull": partial(plane_moves.pull, plane, view, (a, b), (b, c), SIZE),
         }
         plane = moves[data.draw(st.sampled_from(sorted(moves)))]()
         Plane.model_validate(plane.model_dump())

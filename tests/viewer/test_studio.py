@@ -243,18 +243,6 @@ def test_opening_a_scene_begins_anew(studio: Studio) -> None:
     converged(studio)
 
 
-def test_a_file_that_is_wrong_leaves_the_scene(studio: Studio, tmp_path: Path) -> None:
-    path = tmp_path / "bad.yaml"
-    path.write_text("version: 1\n")
-    scene = studio.scene
-    assert not studio.open_file(path)
-    assert studio.scene is scene
-    assert studio.messages[-1].wrong
-    path.write_text(BALL)
-    assert studio.open_file(path)
-    assert studio.scene == scene_of(BALL)
-
-
 def test_stereo_that_is_fitted(studio: Studio) -> None:
     assert studio.edit({"stereo": scene_of(BULB, STEREO, "stereo.fit=auto").resolved()["stereo"]})
     converged(studio)

@@ -30,7 +30,8 @@ def sized(width: int, height: int, *overrides: str) -> list[str]:
 def assert_as_films(canvas: Canvas, job: Job, device: Device) -> None:
     films = JobFilms(job)
     run(job, films.films, LocalExecutor(device))
-    depths = canvas.read_depths(device.transfers)
+    depths, read = canvas.start_reading_depths(device.transfers)
+    read.wait()
     for number, film in enumerate(films.films):
         found = canvas.read(device.transfers, number)
         for name in CHANNELS:

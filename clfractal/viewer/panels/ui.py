@@ -34,12 +34,10 @@ class Speed:
 
     Attributes:
         frames: a second, while something moves; 0 at rest.
-        latency: from the last input to the picture that answers it, seconds.
         way: `shared` or `copied`: how pictures get from OpenCL to OpenGL.
     """
 
     frames: float = 0.0
-    latency: float = 0.0
     way: str = "copied"
 
 
