@@ -15,13 +15,10 @@ from clfractal.api import load_scene
 from clfractal.optics.stereo import degrees
 from clfractal.pictures.anaglyph import (
     IDEAL,
-    REAL_RED_CYAN,
     Filter,
     Floats,
     Glasses,
     Method,
-    ghosting,
-    leaking,
     matrices,
     mix,
 )
@@ -29,6 +26,7 @@ from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
+from tests.ghosting import REAL_RED_CYAN, ghosting, leaking
 from tests.makers import maker, pictured
 from tests.test_docs_content import DOCS, code, table, text
 

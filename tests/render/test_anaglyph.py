@@ -10,15 +10,12 @@ import pytest
 from clfractal.pictures.anaglyph import (
     IDEAL,
     LUMINANCE,
-    REAL_RED_CYAN,
     Glasses,
     Method,
-    filtered,
-    ghosting,
-    leaking,
     matrices,
     mix,
 )
+from tests.ghosting import REAL_RED_CYAN, filtered, ghosting, leaking
 
 GLASSES: tuple[Glasses, ...] = ("red_cyan", "green_magenta", "amber_blue")
 METHODS: tuple[Method, ...] = ("color", "half_color", "gray", "dubois")
