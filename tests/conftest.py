@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import random
+import signal
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -62,3 +64,11 @@ def clf(
     if scene is not None:
         (tmp_path / "scene.yaml").write_text(scene)
     return InProcess(capfd)
+
+
+@pytest.fixture
+def interrupts_are_not_ignored() -> Iterator[None]:
+    """A test run in the background ignores Ctrl-C, and so would the processes it starts."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

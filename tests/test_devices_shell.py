@@ -11,7 +11,6 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 from clfractal.device.select import choose
@@ -20,26 +19,16 @@ from clfractal.files.exr import read_exr
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import Result
 from tests.halves import halves_of
+from tests.interrupts import planes
+from tests.long_renders import ENDLESS, HEAVY, LIMIT_SECONDS, PROMISE_SECONDS, TILES, interrupt
 from tests.shell import Ended, InProcess, command, environment, process
-from tests.test_interrupt import (  # the same promise
-    ENDLESS,
-    LIMIT_SECONDS,
-    PROMISE_SECONDS,
-    _interrupts_are_not_ignored,
-    interrupt,
-)
-from tests.test_resume import HEAVY, TILES
 
-__all__ = ["_interrupts_are_not_ignored"]
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 
 @pytest.fixture(scope="module")
 def halves() -> str:
     return halves_of(choose())
-
-
-def planes(path: Path) -> dict[str, bytes]:
-    return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
 
 
 def render(folder: Path, *options: str) -> Ended:

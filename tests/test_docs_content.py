@@ -31,40 +31,10 @@ from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.viewer import settings
 from clfractal.work import frames
+from tests.document import DOCS, code, section, table, text
 from tests.shell import SCENE, InProcess
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
 PACKAGE = Path(clfractal.__file__).resolve().parent
-
-
-def text(page: str) -> str:
-    return (DOCS / page).read_text(encoding="utf-8")
-
-
-def section(page: str, heading: str) -> str:
-    """What stands under a heading, up to the next one of any level."""
-    found = re.search(rf"^#+ {re.escape(heading)}\n(.*?)(?=^#|\Z)", text(page), re.MULTILINE | re.DOTALL)
-    assert found, f"{page} has no heading {heading!r}"
-    return found[1]
-
-
-def table(page: str, heading: str) -> list[list[str]]:
-    """The rows of the first table under a heading, without its head; cells without their outer spaces."""
-    lines = section(page, heading).splitlines()
-    first = next(i for i, line in enumerate(lines) if line.startswith("|"))
-    rows = []
-    for line in lines[first:]:
-        if not line.startswith("|"):
-            break
-        rows.append([cell.strip().replace("\\|", "|") for cell in re.split(r"(?<!\\)\|", line)[1:-1]])
-    return rows[2:]
-
-
-def code(cell: str) -> str:
-    """The first piece of code in a cell."""
-    found = re.search(r"`([^`]+)`", cell)
-    assert found, cell
-    return found[1]
 
 
 # --- scenes ---

@@ -26,9 +26,9 @@ from clfractal.pictures.modes import eye_size, picture_size
 from clfractal.pictures.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
+from tests.document import DOCS, code, table, text
 from tests.ghosting import REAL_RED_CYAN, ghosting, leaking
 from tests.makers import maker, pictured
-from tests.test_docs_content import DOCS, code, table, text
 
 WIDTH, HEIGHT = 640, 360
 

@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.settings import Settings
-from tests.test_docs_content import DOCS, table
+from tests.document import DOCS, table
 
 
 def test_the_table_of_keys() -> None:

@@ -2,12 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
-import signal
-import subprocess
 import time
-from collections.abc import Callable, Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -20,54 +16,10 @@ from clfractal.commands.unfinished import Unfinished
 from clfractal.device.select import choose
 from clfractal.scene.load import load_scene
 from clfractal.work.prepare import prepare
-from tests.shell import SCENE, command, environment
+from tests.long_renders import ENDLESS, LIMIT_SECONDS, PROMISE_SECONDS, interrupt
+from tests.shell import SCENE
 
-# One tile of this takes a CPU several seconds: its kernel cannot be stopped, only left.
-ENDLESS = """version: 1
-formula: {name: mandelbulb, iterations: 3000}
-image: {width: 256, height: 256}
-camera: {position: [0, -2.2, 0], fov: 40}
-renderer: {type: surface, samples: 65536, detail: 0.01, max_steps: 100000}
-"""
-# What one answer may take on a loaded machine; the promise, half a second, the fastest of three has to keep.
-LIMIT_SECONDS = 1.5
-PROMISE_SECONDS = 0.5
-
-
-@pytest.fixture(autouse=True)
-def _interrupts_are_not_ignored() -> Iterator[None]:
-    """A test run in the background ignores Ctrl-C, and so would the processes it starts."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
-
-
-def interrupt(
-    folder: Path, ready: Callable[[], bool], extra: dict[str, str], *options: str
-) -> tuple[int, str, float]:
-    """Starts a render, waits until it is `ready`, sends SIGINT; gives status, standard error and seconds."""
-    running = subprocess.Popen(
-        command("render", "endless.yaml", "-o", "out.exr", *options),
-        cwd=folder,
-        env=environment(extra),
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        deadline = time.monotonic() + 120
-        while not ready():
-            assert running.poll() is None, running.communicate()[1]
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        start = time.monotonic()
-        running.send_signal(signal.SIGINT)
-        _, told = running.communicate(timeout=60)
-        return running.returncode, told, time.monotonic() - start
-    finally:
-        if running.poll() is None:
-            os.killpg(running.pid, signal.SIGKILL)
-            running.wait()
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 
 def _is_past(moment: float) -> bool:

@@ -19,10 +19,10 @@ from clfractal.commands.shell import Shell
 from clfractal.device import program
 from clfractal.formulas import catalog
 from clfractal.work.precompile import library_scenes
+from tests.long_renders import LIMIT_SECONDS
 from tests.shell import SCENE, Ended, InProcess, command, environment, process
-from tests.test_interrupt import LIMIT_SECONDS, _interrupts_are_not_ignored
 
-__all__ = ["_interrupts_are_not_ignored"]
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 TOLD = re.compile(r".*: (\d+) programs, (\d+) of them compiled now; [\d.]+ s, the cache has ([\d.]+) MB\n")
 # Scenes that take one small program each.

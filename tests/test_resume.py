@@ -19,29 +19,13 @@ import clfractal
 from clfractal.commands.shell import Shell
 from clfractal.commands.unfinished import Unfinished, continued
 from clfractal.device.select import choose
-from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
 from clfractal.scene.load import load_scene
 from clfractal.work.prepare import prepare
+from tests.interrupts import planes
+from tests.long_renders import HEAVY, TILES
 from tests.shell import SCENE, Ended, command, environment, process
 from tests.variants import one_of
-
-# Heavy enough for several batches of tiles, each of a fraction of a second.
-HEAVY = """version: 1
-formula: {name: mandelbulb, iterations: 60}
-image: {width: 224, height: 160}
-camera: {position: [0, -2.2, 0.4], fov: 40}
-renderer: {type: surface, samples: 16, detail: 0.2}
-output:
-  channels: [R, G, B, A, Z, N.X, iterations, steps]
-  precision: {R: float, G: float, B: float, N.X: float}
-"""
-TILES = 7 * 5
-
-
-def planes(path: Path) -> dict[str, bytes]:
-    """The bytes of every channel."""
-    return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
 
 
 def render(folder: Path, *options: str) -> Ended:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.test_wheel import ROOT, built_wheel, names_in
+from tests.wheels import ROOT, built_wheel, names_in
 
 LARGEST = 5_000_000
 """Bytes; the pictures of the pages alone are thirty millions."""

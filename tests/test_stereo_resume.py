@@ -7,16 +7,18 @@ import re
 import signal
 import subprocess
 import time
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from clfractal.files.exr import read_exr
+from tests.interrupts import planes
+from tests.long_renders import HEAVY
 from tests.shell import SCENE as SMALL
 from tests.shell import Ended, InProcess, command, environment, process
-from tests.test_resume import HEAVY, planes
+
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 # (The program of the other file of this kind: its text does not depend on the picture's size.)
 SCENE = HEAVY.replace("width: 224, height: 160", "width: 128, height: 96") + "stereo: {separation: 0.3}\n"
@@ -38,14 +40,6 @@ JournalFilm.put = slowly
 sys.argv = ["clfractal", "render", "scene.yaml", "-o", "out.exr", "--quiet"]
 main()
 """
-
-
-@pytest.fixture(autouse=True)
-def _interrupts_are_not_ignored() -> Iterator[None]:
-    """A test run in the background ignores Ctrl-C, and so would the processes it starts."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
 
 
 def render(folder: Path, *options: str) -> Ended:

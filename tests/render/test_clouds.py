@@ -264,7 +264,7 @@ def test_a_cloud_shines_by_itself(device: Device, folder: Path) -> None:
 @pytest.mark.combination
 def test_a_white_cloud_in_a_white_room_with_glass(device: Device, folder: Path) -> None:
     """An environment that is asked for, a ball of glass and one of milk in the cloud: all stays white."""
-    from tests.scene.test_environment import write_map
+    from tests.environment_maps import write_map
 
     write_map(folder / "white.exr", 1.0)
     materials = {

@@ -19,9 +19,9 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
+from tests.environment_maps import write_map
 from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import in_voxels, keep, middles, to_box, value_at
-from tests.scene.test_environment import write_map
 
 pytestmark = pytest.mark.light
 

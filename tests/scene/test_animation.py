@@ -15,29 +15,12 @@ import clfractal
 from clfractal.errors import ClfractalError, SceneError
 from clfractal.formulas.opencl import write_formula
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
-
-HEAD = """\
-version: 1
-formula: {name: mandelbulb, iterations: 8}
-camera: {position: [0, -3, 0.5], fov: 45}
-"""
-
-
-def moving(tracks: dict[str, Any], *, base: dict[str, Any] | None = None, **animation: Any) -> Scene:
-    given: dict[str, Any] = {"fps": 10, "frames": 21, "tracks": tracks, **animation}
-    scene = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {"position": [0, -3, 0]}}
-    return load_scene({**scene, **(base or {}), "animation": given})
+from tests.scene.movements import HEAD, moving, values
 
 
 def keys(*pairs: tuple[float, Any], **others: Any) -> dict[str, Any]:
     return {"keys": [{"frame": frame, "value": value} for frame, value in pairs], **others}
-
-
-def values(scene: Scene, name: str) -> list[Any]:
-    assert scene.animation is not None
-    return [movement_of(scene).values(frame)[name] for frame in range(scene.animation.count)]
 
 
 def test_times_in_seconds_and_frames() -> None:

@@ -18,18 +18,11 @@ from clfractal.scene.environment import names
 from clfractal.scene.lighting import Environment
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
+from tests.environment_maps import write_map
 from tests.makers import maker
 from tests.shell import SCENE, InProcess, process
 
 OUR_OWN = ("dusk", "overcast", "studio")
-
-
-def write_map(path: Path, value: float = 0.5, size: tuple[int, int] = (8, 4)) -> Path:
-    path.parent.mkdir(exist_ok=True)
-    plane = np.full(size[::-1], value, np.float32)
-    bands = [dict.fromkeys("RGB", plane)]
-    write_exr(path, bands, display=size, region=(0, 0, *size), channels="RGB", half="")
-    return path
 
 
 @pytest.fixture

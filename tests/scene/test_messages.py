@@ -6,18 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from clfractal.errors import ClfractalError, FileError, FormulaError, SceneError
+from clfractal.errors import ClfractalError, SceneError
 from clfractal.scene.load import load_scene
+from tests.scene.errors import error_of, marked
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\n"
-
-
-def error_of(text: str, *overrides: str, folder: Path | None = None) -> str:
-    with pytest.raises((SceneError, FormulaError, FileError)) as caught:
-        load_scene(text, overrides=overrides, folder=folder)
-    assert "\n" not in str(caught.value)
-    assert caught.value.status == 2
-    return str(caught.value)
 
 
 COLOR = "must be a list of 3 numbers, or a colour as '#ff8800' or '#f80'"
@@ -288,12 +281,6 @@ CASES = [
     ("lights: §3\nimage: {width: 0}", "lights: must be a list, got 3"),
     ("camera: {up: §1, fov: 400, fow: 1}", "camera.up: must be a list of 3 numbers, got 1"),
 ]
-
-
-def marked(text: str) -> tuple[str, str]:
-    """The text without its mark, and the mark's place as messages show it."""
-    before, _, after = text.partition("§")
-    return before + after, f"scene:{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
 
 
 @pytest.mark.parametrize(("lines", "message"), CASES)

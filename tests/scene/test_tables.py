@@ -10,7 +10,7 @@ import pytest
 import clfractal
 from clfractal.errors import ClfractalError
 from clfractal.scene.load import load_scene
-from tests.scene.test_animation import HEAD, moving, values
+from tests.scene.movements import HEAD, moving, values
 
 
 def test_a_table_moves_a_value(tmp_path: Path) -> None:

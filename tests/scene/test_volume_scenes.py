@@ -15,7 +15,7 @@ from clfractal.errors import DeviceError
 from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.work.engine import Engine
-from tests.scene.test_messages import error_of, marked
+from tests.scene.errors import error_of, marked
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 VOLUME = "renderer: {type: volume, "

@@ -1,4 +1,4 @@
-"""The device that pictures are rendered on, with a context of its own, since a session has a thread; and a screen."""
+"""The device that pictures are rendered on, with a context of its own, since a session has a thread; a screen; and more."""
 
 from __future__ import annotations
 
@@ -6,10 +6,14 @@ import os
 import shutil
 import subprocess
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
+from clfractal.device import cache, program
 from clfractal.device.select import Device, choose
+from tests.viewer.scene_files import FORMULA, SCENE
+from tests.viewer.slow_compiler import Slow
 
 
 @pytest.fixture(scope="session")
@@ -48,3 +52,22 @@ def screen() -> Iterator[None]:
         yield
     server.terminate()
     server.wait()
+
+
+@pytest.fixture
+def desk(tmp_path: Path) -> Path:
+    """A folder with a scene and the formula file that it names."""
+    (tmp_path / "own.yaml").write_text(FORMULA)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+@pytest.fixture
+def slow(monkeypatch: pytest.MonkeyPatch) -> Slow:
+    """Programs are compiled as slowly as it is told."""
+    found = Slow()
+    monkeypatch.setattr(program, "_compile", found)
+    # What is in the cache on the disk is not compiled.
+    monkeypatch.setattr(cache, "load_blob", lambda key: None)
+    monkeypatch.setattr(cache, "store_blob", lambda key, blob: None)
+    return found

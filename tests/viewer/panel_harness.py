@@ -21,7 +21,10 @@ from clfractal.scene.model import Scene
 from clfractal.viewer import studio as studio_module
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import (
+    scene_dock,
+    theme,
+)
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
@@ -294,3 +297,11 @@ def screenshot(
         textures.close()
         imgui.destroy_context(context)
         return pixels
+
+
+def opened(scene: Any, size: tuple[float, float] = (1280, 4000)) -> Ui:
+    """A dock with all panels open, high enough for all of them."""
+    ui, _ = make_ui(scene)
+    ui.size = size
+    ui.memory["open"] = dict.fromkeys(scene_dock.KEYS, True)
+    return ui

@@ -140,3 +140,33 @@ def shown_frame(device: Device, watch: Watch, frame: Frame, look: Look) -> tuple
         return shown, target.pixels.copy()
     finally:
         display.close()
+
+
+HALVES = "layout={columns: 2, gap: 3, views: [{}, {renderer: {type: cut_plane, samples: 3}}]}"
+
+SCENES: dict[str, tuple[str, ...]] = {
+    "mandelbulb": (),
+    "hast": ("formula={name: hast, iterations: 12}",),
+    "one sample": ("renderer.samples=1",),
+    "adaptive": ("renderer={samples: 16, noise: 0.02, min_samples: 4}",),
+    "float64": ("renderer.precision=float64",),
+    "volume": ("renderer={type: volume, resolution: 24, samples: 3}", "coloring.by=solid"),
+    "cut plane": ("renderer={type: cut_plane, samples: 5, plane: {width: 3, height: 2}}",),
+    "layout": (HALVES,),
+    "odd size": ("image.width=77", "image.height=41"),
+    "pair": (STEREO, "stereo.mode=pair"),
+    "anaglyph": (STEREO,),
+    "squeezed": (STEREO, "stereo.mode=split_half"),
+    "fitted": (STEREO, "stereo.fit=auto"),
+    "layout and stereo": (HALVES, STEREO, "stereo.mode=rows"),
+}
+
+
+def shell(scene: Scene) -> clfractal.Film:
+    """The shell's picture."""
+    return clfractal.render(scene, channels=CHANNELS)
+
+
+def turned(scene: Scene, step: float) -> Scene:
+    camera = scene.camera.model_copy(update={"position": (2.8 * np.sin(step), -2.8 * np.cos(step), 0.6)})
+    return scene.model_copy(update={"camera": camera})

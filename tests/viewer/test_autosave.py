@@ -17,7 +17,7 @@ from clfractal.viewer.autosave import Autosave, default_folder
 from clfractal.viewer.files import Files
 from clfractal.viewer.options import Options
 from clfractal.viewer.saving import SceneSource, open_source, save_scene
-from tests.viewer.test_saving import desk, with_camera  # noqa: F401 (a fixture)
+from tests.viewer.scene_files import with_camera
 
 # Another window: keeps a scene with the given field of view, says so, and waits for its end.
 WINDOW = """
@@ -57,7 +57,7 @@ def present_of(source: SceneSource, fov: float) -> Scene:
     return with_camera(source.loaded, fov=fov)
 
 
-def test_what_a_killed_window_leaves_is_found(desk: Path, store: Path) -> None:  # noqa: F811
+def test_what_a_killed_window_leaves_is_found(desk: Path, store: Path) -> None:
     path = desk / "scene.yaml"
     first, second = window(path, store, 20), window(path, store, 40)
     try:
@@ -90,7 +90,7 @@ def test_what_a_killed_window_leaves_is_found(desk: Path, store: Path) -> None: 
     assert len(Autosave(store).found()) == 1
 
 
-def test_a_window_that_is_closed_leaves_nothing(desk: Path, store: Path) -> None:  # noqa: F811
+def test_a_window_that_is_closed_leaves_nothing(desk: Path, store: Path) -> None:
     other = window(desk / "scene.yaml", store, 20)
     other.communicate("close\n", timeout=60)
     assert list(store.iterdir()) == []
@@ -106,7 +106,7 @@ def test_a_window_that_is_closed_leaves_nothing(desk: Path, store: Path) -> None
 
 
 def test_what_was_offered_and_not_taken_is_offered_again(
-    desk: Path,  # noqa: F811
+    desk: Path,
     store: Path,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
@@ -126,7 +126,7 @@ def test_what_was_offered_and_not_taken_is_offered_again(
     assert Autosave(store).found() == []
 
 
-def test_only_changes_to_one_scene_are_asked_for(desk: Path, store: Path, tmp_path: Path) -> None:  # noqa: F811
+def test_only_changes_to_one_scene_are_asked_for(desk: Path, store: Path, tmp_path: Path) -> None:
     """Those to other scenes wait for these; a link leads to the same scene."""
     link = tmp_path / "link.yaml"
     link.symlink_to(desk / "scene.yaml")
@@ -145,7 +145,7 @@ def test_only_changes_to_one_scene_are_asked_for(desk: Path, store: Path, tmp_pa
         each.discard()
 
 
-def test_an_error_keeps_the_work(desk: Path, store: Path) -> None:  # noqa: F811
+def test_an_error_keeps_the_work(desk: Path, store: Path) -> None:
     source = open_source(desk / "scene.yaml")
 
     def window() -> None:
@@ -159,7 +159,7 @@ def test_an_error_keeps_the_work(desk: Path, store: Path) -> None:  # noqa: F811
     assert found.scene() == present_of(source, 25)
 
 
-def test_the_last_state_is_kept(desk: Path, store: Path) -> None:  # noqa: F811
+def test_the_last_state_is_kept(desk: Path, store: Path) -> None:
     source = open_source(desk / "scene.yaml")
     own = Autosave(store)
     for fov in (25, 26, 27):
@@ -174,7 +174,7 @@ def test_the_last_state_is_kept(desk: Path, store: Path) -> None:  # noqa: F811
     own.close()
 
 
-def test_a_scene_from_nowhere_and_one_whose_file_is_gone(desk: Path, store: Path) -> None:  # noqa: F811
+def test_a_scene_from_nowhere_and_one_whose_file_is_gone(desk: Path, store: Path) -> None:
     nowhere = load_scene({"version": 1, "formula": {"name": "hast"}, "camera": {"fov": 20}})
     own = Autosave(store)
     own.write(SceneSource(), nowhere)
@@ -209,7 +209,7 @@ def test_a_scene_from_nowhere_and_one_whose_file_is_gone(desk: Path, store: Path
         (".json", None),
     ],
 )
-def test_damaged_leftovers_are_removed(desk: Path, store: Path, name: str, content: bytes | None) -> None:  # noqa: F811
+def test_damaged_leftovers_are_removed(desk: Path, store: Path, name: str, content: bytes | None) -> None:
     source = open_source(desk / "scene.yaml")
     own = Autosave(store)
     own.write(source, present_of(source, 25))
@@ -223,7 +223,7 @@ def test_damaged_leftovers_are_removed(desk: Path, store: Path, name: str, conte
     assert list(store.iterdir()) == []
 
 
-def test_a_disk_that_cannot_be_written(desk: Path, tmp_path: Path) -> None:  # noqa: F811
+def test_a_disk_that_cannot_be_written(desk: Path, tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     source = open_source(desk / "scene.yaml")
     own = Autosave(tmp_path / "file" / "autosave")

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 pytest.importorskip("imgui_bundle")
 
 from clfractal.viewer.panels import color_button
+from tests.viewer.fields import BOX, stage_of
 from tests.viewer.panel_harness import headless
-from tests.viewer.test_widgets import BOX, stage_of
 
 
 @pytest.fixture(autouse=True)

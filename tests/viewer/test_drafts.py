@@ -21,9 +21,17 @@ from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.run import run
 from tests.viewer.panel_harness import make_ui
-from tests.viewer.sessions import BULB, equal_pictures, films_of, scene_of, session_on, wait_for
-from tests.viewer.test_preparing import Slow, slow  # noqa: F401 (a fixture)
-from tests.viewer.test_session import shell, turned
+from tests.viewer.sessions import (
+    BULB,
+    equal_pictures,
+    films_of,
+    scene_of,
+    session_on,
+    shell,
+    turned,
+    wait_for,
+)
+from tests.viewer.slow_compiler import Slow
 
 PATHS = (
     "lighting={mode: path}",
@@ -92,7 +100,7 @@ def test_where_pictures_are_never_coarse_there_are_no_drafts(device: Device) -> 
         assert not any(each.is_draft for each in watch.frames)
 
 
-def test_the_first_move_compiles_nothing(device: Device, slow: Slow) -> None:  # noqa: F811
+def test_the_first_move_compiles_nothing(device: Device, slow: Slow) -> None:
     """The draft's program is compiled behind the first picture; and only once, wherever the camera goes."""
     scene = scene_of(BULB, *PATHS)
     with session_on(device) as watch:

@@ -21,26 +21,8 @@ from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.sources import open_source
 from clfractal.viewer.standard_views import to_orthographic
-from clfractal.viewer.studio import Studio
-from tests.viewer.films import MOVING
+from tests.viewer.films import MOVING, STILL, keys, studio_of
 from tests.viewer.panel_harness import make_ui
-
-STILL = MOVING.partition("animation:")[0]
-
-
-def studio_of(text: str = MOVING, frame: float | None = 0) -> Studio:
-    """A studio that renders nothing, at a frame."""
-    studio = make_ui(text)[0].studio
-    if frame is not None:
-        assert studio.go_to_frame(frame)
-    return studio
-
-
-def keys(studio: Studio, name: str) -> dict[float, Any]:
-    animation = studio.scene.animation
-    assert animation is not None
-    return {animation.frame_of(key): key.value for key in animation.tracks[name].keys or ()}
-
 
 # What is shown, and what is saved
 

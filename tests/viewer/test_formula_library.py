@@ -18,8 +18,7 @@ from clfractal.viewer.panels import formula, formula_library
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.pointer import project
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui
-from tests.viewer.test_panels import opened
+from tests.viewer.panel_harness import Stage, headless, make_ui, opened
 
 
 @pytest.fixture(autouse=True)

@@ -20,8 +20,7 @@ from clfractal.scene.plane import rotated
 from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock, transfer
 from clfractal.viewer.panels.ui import Ui
 from tests.render.volumes import keep
-from tests.viewer.panel_harness import Stage, headless, make_ui
-from tests.viewer.test_panels import opened
+from tests.viewer.panel_harness import Stage, headless, make_ui, opened
 
 
 @pytest.fixture(autouse=True)

@@ -41,7 +41,7 @@ from clfractal.viewer.panels import (
 from clfractal.viewer.panels.ui import Ui
 from clfractal.work.local import LocalExecutor
 from tests.variants import one_of
-from tests.viewer.panel_harness import INFO, Stage, background, headless, make_ui, screenshot
+from tests.viewer.panel_harness import INFO, Stage, background, headless, make_ui, opened, screenshot
 
 SCENES = sorted(str(path) for path in Path("scenes").glob("*.yaml"))
 KINDS = [
@@ -56,14 +56,6 @@ KINDS = [
 def _context() -> Iterator[None]:
     with headless():
         yield
-
-
-def opened(scene: Any, size: tuple[float, float] = (1280, 4000)) -> Ui:
-    """A dock with all panels open, high enough for all of them."""
-    ui, _ = make_ui(scene)
-    ui.size = size
-    ui.memory["open"] = dict.fromkeys(scene_dock.KEYS, True)
-    return ui
 
 
 # Drawing

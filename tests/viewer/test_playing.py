@@ -15,7 +15,7 @@ from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.navigation import dolly
 from clfractal.viewer.playing import Player
 from clfractal.viewer.thinning import TOLERANCE, Sample, at_frames, flight
-from tests.viewer.test_filming import STILL, keys, studio_of
+from tests.viewer.films import STILL, keys, studio_of
 
 
 def player_of(*scene: Any) -> Player:

@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
-from clfractal.device import cache, program
+from clfractal.device import program
 from clfractal.device.select import Device
-from clfractal.errors import DeviceError, Stopped
+from clfractal.errors import DeviceError
 from clfractal.renderers.volume import VolumeKernel
 from clfractal.scene.model import Scene
 from clfractal.viewer.editing import edited
@@ -19,41 +19,22 @@ from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import differs_by_view, seen_from
 from clfractal.viewer.studio import Studio
-from tests.viewer.sessions import BULB, STEREO, equal_pictures, films_of, scene_of, session_on, wait_for
-from tests.viewer.test_session import SCENES, shell, turned
+from tests.viewer.sessions import (
+    BULB,
+    SCENES,
+    STEREO,
+    equal_pictures,
+    films_of,
+    scene_of,
+    session_on,
+    shell,
+    turned,
+    wait_for,
+)
+from tests.viewer.slow_compiler import Slow
 
 SLOW = 1.2
 """Seconds that a program takes here at least, whatever the machine compiles it in."""
-
-
-class Slow:
-    """Makes compiling slow, as a driver may be; counts what was begun, and what was finished."""
-
-    def __init__(self) -> None:
-        self.seconds = 0.0
-        self.begun = self.ended = 0
-        self._compile: Callable[..., Any] = program._compile
-
-    def __call__(self, *arguments: Any, stopped: Callable[[], bool] | None, **options: Any) -> Any:
-        self.begun += 1
-        end = time.perf_counter() + self.seconds
-        while time.perf_counter() < end:
-            if stopped is not None and stopped():
-                raise Stopped
-            time.sleep(0.005)
-        found = self._compile(*arguments, stopped=stopped, **options)
-        self.ended += 1
-        return found
-
-
-@pytest.fixture
-def slow(monkeypatch: pytest.MonkeyPatch) -> Slow:
-    found = Slow()
-    monkeypatch.setattr(program, "_compile", found)
-    # What is in the cache on the disk is not compiled.
-    monkeypatch.setattr(cache, "load_blob", lambda key: None)
-    monkeypatch.setattr(cache, "store_blob", lambda key, blob: None)
-    return found
 
 
 class Shown:

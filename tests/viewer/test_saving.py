@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +14,6 @@ from clfractal.errors import FileError
 from clfractal.files.png import SCENE_KEY, write_png_pixels
 from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.scene.model import Scene
 from clfractal.viewer.saving import (
     SceneSource,
     is_protected,
@@ -24,45 +22,8 @@ from clfractal.viewer.saving import (
     scene_text,
     suggested_name,
 )
-from tests.scene.test_environment import write_map
-
-SCENES = sorted(resources.folder("scenes").glob("*.yaml"))
-FORMULA = """\
-# The third power
-title: Own
-variables: [x, y, z]
-parameters: {a: {default: 1, minimum: 0, maximum: 2}}
-map: [x*x - y*y, 2*a*x*y, z*z]
-degree: 2
-bounds: {radius: 2}
-"""
-SCENE = """\
-# Mine
-
-version: 1
-formula: {file: own.yaml, iterations: 12}  # my own
-camera:
-  position: [0, -3, 0]  # near
-  fov: 30
-lights:
-  # the key light
-  - {direction: [0, 0, -1], intensity: 2}
-  # the fill light
-  - {direction: [1, 0, 0], shadow: false}
-"""
-
-
-@pytest.fixture
-def desk(tmp_path: Path) -> Path:
-    """A folder with a scene and the formula file that it names."""
-    (tmp_path / "own.yaml").write_text(FORMULA)
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    return tmp_path
-
-
-def with_camera(scene: Scene, **values: Any) -> Scene:
-    return scene.model_copy(update={"camera": scene.camera.model_copy(update=values)})
-
+from tests.environment_maps import write_map
+from tests.viewer.scene_files import FORMULA, SCENE, SCENES, with_camera
 
 # --- saving where it came from ---
 

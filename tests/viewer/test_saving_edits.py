@@ -21,7 +21,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 from clfractal.viewer.saving import SceneSource, open_source, scene_text
 from clfractal.viewer.sparse import without_defaults
-from tests.viewer.test_saving import SCENES, with_camera
+from tests.viewer.scene_files import SCENES, with_camera
 
 
 def commented(text: str) -> str:

@@ -27,38 +27,17 @@ from clfractal.work.run import run
 from tests.viewer.sessions import (
     BALL,
     BULB,
-    STEREO,
+    SCENES,
     Watch,
     equal_pictures,
     films_of,
     planes,
     scene_of,
     session_on,
+    shell,
+    turned,
     wait_for,
 )
-
-HALVES = "layout={columns: 2, gap: 3, views: [{}, {renderer: {type: cut_plane, samples: 3}}]}"
-SCENES: dict[str, tuple[str, ...]] = {
-    "mandelbulb": (),
-    "hast": ("formula={name: hast, iterations: 12}",),
-    "one sample": ("renderer.samples=1",),
-    "adaptive": ("renderer={samples: 16, noise: 0.02, min_samples: 4}",),
-    "float64": ("renderer.precision=float64",),
-    "volume": ("renderer={type: volume, resolution: 24, samples: 3}", "coloring.by=solid"),
-    "cut plane": ("renderer={type: cut_plane, samples: 5, plane: {width: 3, height: 2}}",),
-    "layout": (HALVES,),
-    "odd size": ("image.width=77", "image.height=41"),
-    "pair": (STEREO, "stereo.mode=pair"),
-    "anaglyph": (STEREO,),
-    "squeezed": (STEREO, "stereo.mode=split_half"),
-    "fitted": (STEREO, "stereo.fit=auto"),
-    "layout and stereo": (HALVES, STEREO, "stereo.mode=rows"),
-}
-
-
-def shell(scene: Scene) -> clfractal.Film:
-    """The shell's picture."""
-    return clfractal.render(scene, channels=CHANNELS)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -92,11 +71,6 @@ def test_frames_become_finer(device: Device) -> None:
     assert whole[-1] == 4
     assert [frame.number for frame in frames] == sorted({frame.number for frame in frames})
     assert [frame.finished for frame in frames].index(True) == len(frames) - 1
-
-
-def turned(scene: Scene, step: float) -> Scene:
-    camera = scene.camera.model_copy(update={"position": (2.8 * np.sin(step), -2.8 * np.cos(step), 0.6)})
-    return scene.model_copy(update={"camera": camera})
 
 
 def test_while_something_moves_frames_come_whatever_the_rate_of_requests(device: Device) -> None:

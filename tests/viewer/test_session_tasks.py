@@ -19,17 +19,19 @@ from clfractal.viewer.background import Still, Task, Tell, Thumbnail
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.session import Session
 from clfractal.work.local import LocalExecutor
+from tests.calls import counted
 from tests.viewer.sessions import (
     BALL,
     BULB,
+    SCENES,
     equal_pictures,
     films_of,
     scene_of,
     session_on,
+    shell,
+    turned,
     wait_for,
 )
-from tests.viewer.test_session import SCENES, shell, turned
-from tests.work.test_engine import counted
 
 
 def test_thumbnails_and_stills_come_in_between(device: Device, tmp_path: Path) -> None:

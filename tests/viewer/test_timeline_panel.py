@@ -25,10 +25,9 @@ from clfractal.viewer.panels import (
 )
 from clfractal.viewer.panels import timeline as panel
 from clfractal.viewer.playing import Player
-from tests.viewer.films import MOVING
+from tests.viewer.films import MOVING, STILL, keys
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, headless, make_ui
-from tests.viewer.test_filming import STILL, keys
 
 ROWS = ("camera.position", "formula.parameters.power", "camera.fov")
 

@@ -20,9 +20,9 @@ from clfractal.viewer.panels import material, metadata, timeline_inspector
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Scale, bar_part, moved_by, text_of, typed_number
 from clfractal.viewer.panels.ui import Ui
+from tests.viewer.fields import BOX, DOT, LABEL, SCENE, stage_of
 from tests.viewer.panel_harness import Stage, headless, make_ui
 
-SCENE = "scenes/mandelbulb.yaml"
 finite = st.floats(-1e9, 1e9)
 
 
@@ -30,20 +30,6 @@ finite = st.floats(-1e9, 1e9)
 def _context() -> Iterator[None]:
     with headless():
         yield
-
-
-def stage_of(path: str, **options: object) -> Stage:
-    """One field at the top of a window."""
-    ui, _ = make_ui(SCENE)
-
-    def draw(ui: Ui) -> None:
-        w.field(ui, path, **options)  # type: ignore[arg-type]
-
-    return Stage(ui, draw)
-
-
-# The middle of the first row's box, and of its label, points.
-BOX, LABEL, DOT = (220.0, 29.0), (60.0, 29.0), (21.0, 29.0)
 
 
 # What the schema tells

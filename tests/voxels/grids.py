@@ -93,3 +93,8 @@ def decoded(normals: npt.NDArray[np.uint8]) -> tuple[Floats, npt.NDArray[np.bool
     vectors = normals[..., :3] / 127.5 - 1
     length = np.linalg.norm(vectors, axis=-1, keepdims=True)
     return vectors / length, (normals[..., :3] != 128).any(axis=-1)
+
+
+# Voxels of a million that rounding in float32 may decide another way than float64: those at the surface whose orbits are
+# long.
+ROUNDED = 20e-6

@@ -13,11 +13,7 @@ from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.voxels.fill import FillProgress
-from tests.voxels.grids import device, differing_voxels, filled, inside, volume_scene, voxel_points
-
-# Voxels of a million that rounding in float32 may decide another way than float64: those at the surface whose orbits are
-# long.
-ROUNDED = 20e-6
+from tests.voxels.grids import ROUNDED, device, differing_voxels, filled, inside, volume_scene, voxel_points
 
 
 def check_inside(grid: Any, scene: Any, share: float = ROUNDED) -> None:

@@ -21,9 +21,8 @@ from clfractal.scene.objects import FormulaObject
 from tests.render.joined_oracle import SIMPLE, Distance, Floats, a_sphere, ball, normal_at, smooth, solids
 from tests.render.shots import BALL, SOLIDS
 from tests.variants import one_of
-from tests.voxels.grids import decoded, device, differing_voxels, filled, voxel_points
+from tests.voxels.grids import ROUNDED, decoded, device, differing_voxels, filled, voxel_points
 from tests.voxels.joined import EVERY_JOIN, JULIA, SPONGE, belongs, own_places
-from tests.voxels.test_fill import ROUNDED
 
 
 def scene_of(objects: dict[str, Any], formula: dict[str, Any] | None = None, **settings: Any) -> Scene:

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from tests.window.changes import changes, seen
 from tests.window.display import Display
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SURFACE
-from tests.window.test_sliders import changes, seen
 
 pytestmark = pytest.mark.quiet
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
 import time
 from itertools import pairwise
 from pathlib import Path
@@ -10,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.window.display import Display, Pixels
+from tests.window.changes import changes, seen
+from tests.window.display import Display
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SURFACE
 
@@ -21,29 +21,6 @@ BOX = SURFACE.replace("mandelbulb, iterations: 7", "mandelbox, iterations: 8").r
 )
 SLIDER = (190, 113)
 """The first parameter's, in a window of 1280 x 720."""
-MIDDLE = np.s_[140:640, 420:900]
-"""A part of the window where no panel is."""
-
-
-def seen(window: Window) -> Pixels:
-    left, top, _, _ = window.place
-    return window.display.pixels()[top : top + 720, left : left + 1280][MIDDLE].copy()
-
-
-def changes(window: Window, script: list[object], after: float) -> tuple[list[float], float]:
-    """When the picture changed while a script ran, and for a while after it; and when the script ended. Seconds."""
-    left, top, _, _ = window.place
-    process = subprocess.Popen(["xdotool", *map(str, script)], env=window.display.environment())
-    start, last, found, end = time.monotonic(), seen(window), [], 0.0
-    while not end or time.monotonic() - start < end + after:
-        if not end and process.poll() is not None:
-            end = time.monotonic() - start
-        now = window.display.pixels()[top : top + 720, left : left + 1280][MIDDLE]
-        if not np.array_equal(now, last):
-            found.append(time.monotonic() - start)
-            last = now.copy()
-        time.sleep(0.01)
-    return found, end
 
 
 def preparation(window: Window, value: str) -> float:

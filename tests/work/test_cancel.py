@@ -18,7 +18,7 @@ from clfractal.device.launch import Pace
 from clfractal.device.select import Device
 from clfractal.errors import Stopped
 from clfractal.work.engine import Engine
-from tests.work.test_engine import BULB, VOLUME, changed, equal
+from tests.work.small_pictures import BULB, VOLUME, changed, equal
 
 
 def test_a_token_is_set_by_any_thread() -> None:

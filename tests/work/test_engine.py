@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -14,31 +13,12 @@ from clfractal.device import program
 from clfractal.device.select import Device, choose
 from clfractal.errors import ClfractalError, DeviceError, SceneError
 from clfractal.pictures.film import Film
-from clfractal.scene.model import Scene
 from clfractal.voxels import fill
 from clfractal.work.drawing import Drawing
 from clfractal.work.engine import Engine
 from clfractal.work.local import LocalExecutor
-
-SIZE = {"width": 64, "height": 48}
-BULB = f"""
-version: 1
-formula: {{name: mandelbulb, iterations: 8}}
-image: {{width: {SIZE["width"]}, height: {SIZE["height"]}}}
-camera: {{position: [0, -2.8, 0.6]}}
-"""
-VOLUME = BULB + "renderer: {type: volume, resolution: 32, value: coverage}\n"
-
-
-def equal(first: Film, second: Film) -> None:
-    assert first.channels == second.channels
-    for name in first.channels:
-        np.testing.assert_array_equal(first[name], second[name], name)
-
-
-def changed(text: str, *overrides: str) -> Scene:
-    return clfractal.load_scene(text, overrides=overrides)
-
+from tests.calls import counted
+from tests.work.small_pictures import BULB, VOLUME, changed, equal
 
 CHANGES: dict[str, tuple[str, ...]] = {
     "camera": ("camera.position=[0.5, -2.8, 0.4]",),
@@ -66,19 +46,6 @@ def test_changes_leave_nothing_of_the_picture_before(device: Device) -> None:
         for round_trip in (scenes, scenes[::-1]):
             for scene in round_trip:
                 equal(engine.render(scene), alone[scenes.index(scene)])
-
-
-def counted(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:
-    """Notes the calls of a function."""
-    calls: list[object] = []
-    before: Callable[..., object] = getattr(owner, name)
-
-    def noted(*arguments: object, **settings: object) -> object:
-        calls.append(arguments)
-        return before(*arguments, **settings)
-
-    monkeypatch.setattr(owner, name, noted)
-    return calls
 
 
 def test_what_is_equal_is_not_sent_again(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -28,12 +28,12 @@ from clfractal.work.run import Result, WorkItem
 from clfractal.work.several import SeveralExecutor
 from clfractal.work.sharing import Shared
 from tests.halves import halves_of
+from tests.long_renders import PROMISE_SECONDS
 from tests.shell import environment
-from tests.test_interrupt import PROMISE_SECONDS, _interrupts_are_not_ignored
-from tests.work.test_several import SCENE, same
-from tests.work.test_sharing import Clock, offer
+from tests.work.offers import Clock, offer
+from tests.work.small_pictures import SCENE, same
 
-__all__ = ["_interrupts_are_not_ignored"]
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 
 @dataclass

@@ -19,7 +19,7 @@ from clfractal.renderers import points
 from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.passes import SAMPLING
 from clfractal.work.engine import Engine
-from tests.work.test_engine import equal
+from tests.work.small_pictures import equal
 
 LONG = """
 version: 1

@@ -29,15 +29,8 @@ from clfractal.work.run import Result, WorkItem
 from clfractal.work.several import SeveralExecutor
 from tests.halves import halves_of
 from tests.portability.compare import difference
+from tests.work.small_pictures import SCENE, same
 
-SCENE = """version: 1
-formula: {name: mandelbulb, iterations: 8}
-image: {width: 300, height: 200}
-camera: {position: [0, -2.4, 0.4], fov: 45}
-renderer: {type: surface, samples: 5}
-lights: [{direction: [1, 1, -1], shadow: true}]
-output: {channels: [R, G, B, A, Z, N.X, P.Y, iterations, steps]}
-"""
 TILES = 10 * 7
 
 
@@ -66,10 +59,6 @@ def failing(engine: Engine, which: Sequence[int], after: int) -> SeveralExecutor
         executor.__class__ = Failing
         executor.after = after  # type: ignore[attr-defined]
     return shared
-
-
-def same(one: Film, other: Film) -> bool:
-    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)
 
 
 @pytest.fixture(scope="module")

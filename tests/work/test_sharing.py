@@ -12,24 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.work import sharing
-from clfractal.work.run import WorkItem
-from clfractal.work.sharing import Offer, Shared
+from clfractal.work.sharing import Shared
+from tests.work.offers import Clock, offer
 
 LAUNCH_SECONDS = 0.05
-
-
-class Clock:
-    """The time of the test."""
-
-    now = 0.0
-
-    def perf_counter(self) -> float:
-        return self.now
-
-
-def offer(tiles: int, device: int | None = None, samples: tuple[int, int] = (0, 1)) -> Offer:
-    numbers = np.arange(tiles, dtype=np.int32)
-    return Offer(WorkItem(0, numbers, samples), device, deque([numbers]))
 
 
 def simulated(

@@ -1,0 +1,66 @@
+"""A picture that takes long enough to be stopped halfway, and one that never ends, for tests of Ctrl-C and of resuming."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from tests.shell import command, environment
+
+# Heavy enough for several batches of tiles, each of a fraction of a second.
+HEAVY = """version: 1
+formula: {name: mandelbulb, iterations: 60}
+image: {width: 224, height: 160}
+camera: {position: [0, -2.2, 0.4], fov: 40}
+renderer: {type: surface, samples: 16, detail: 0.2}
+output:
+  channels: [R, G, B, A, Z, N.X, iterations, steps]
+  precision: {R: float, G: float, B: float, N.X: float}
+"""
+
+TILES = 7 * 5
+
+# One tile of this takes a CPU several seconds: its kernel cannot be stopped, only left.
+ENDLESS = """version: 1
+formula: {name: mandelbulb, iterations: 3000}
+image: {width: 256, height: 256}
+camera: {position: [0, -2.2, 0], fov: 40}
+renderer: {type: surface, samples: 65536, detail: 0.01, max_steps: 100000}
+"""
+
+# What one answer may take on a loaded machine; the promise, half a second, the fastest of three has to keep.
+LIMIT_SECONDS = 1.5
+
+PROMISE_SECONDS = 0.5
+
+
+def interrupt(
+    folder: Path, ready: Callable[[], bool], extra: dict[str, str], *options: str
+) -> tuple[int, str, float]:
+    """Starts a render, waits until it is `ready`, sends SIGINT; gives status, standard error and seconds."""
+    running = subprocess.Popen(
+        command("render", "endless.yaml", "-o", "out.exr", *options),
+        cwd=folder,
+        env=environment(extra),
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+    try:
+        deadline = time.monotonic() + 120
+        while not ready():
+            assert running.poll() is None, running.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        start = time.monotonic()
+        running.send_signal(signal.SIGINT)
+        _, told = running.communicate(timeout=60)
+        return running.returncode, told, time.monotonic() - start
+    finally:
+        if running.poll() is None:
+            os.killpg(running.pid, signal.SIGKILL)
+            running.wait()
