@@ -16,17 +16,8 @@ import pytest
 
 from clfractal.errors import FileError
 from clfractal.files.journal import MAGIC, SIDE, Journal
+from tests.files.journals import CHANNELS, COUNT, IDENTITY, content
 from tests.files.limits import file_size_limit
-
-IDENTITY = {"scene": "version: 1\n" * 20, "version": "0.1.0", "device": "PoCL cpu", "samples": 4}
-CHANNELS = ("R", "Z")
-COUNT = 300
-
-
-def content(index: int, rows: int = 32, columns: int = 32) -> np.ndarray:
-    """What a tile must hold: different in every number."""
-    numbers = np.arange(2 * rows * columns, dtype=np.float32) + index * 10000
-    return numbers.reshape(2, rows, columns)
 
 
 def filled(path: Path, indices: range) -> Path:
@@ -242,7 +233,7 @@ def test_full_disk_at_the_start_leaves_the_earlier_journal(tmp_path: Path) -> No
 
 WRITER = """
 import sys, time
-from tests.files.test_journal import CHANNELS, COUNT, IDENTITY, content
+from tests.files.journals import CHANNELS, COUNT, IDENTITY, content
 from clfractal.files.journal import Journal
 journal = Journal.resume(sys.argv[1], IDENTITY, CHANNELS, COUNT)
 missing = [i for i in range(COUNT) if not journal.done[i]]

@@ -12,6 +12,7 @@ import pytest
 from clfractal.errors import ClfractalError, FileError, FormulaError
 from clfractal.formulas import catalog
 from clfractal.formulas.reference import escape
+from tests.formulas.own_formulas import BALL_FILE
 
 REQUIRED = [
     *("hast", "mandelbulb", "mandelbox", "quaternion_julia", "tetrabrot", "burning_ship", "menger_sponge"),
@@ -110,18 +111,6 @@ def test_unknown_names_and_chains() -> None:
     assert catalog.load("hast") is catalog.load("hast")
 
 
-BALL = """\
-title: Ball
-reference: none, 2024
-variables: [x, y, z]
-let: {r: sqrt(x*x + y*y + z*z)}
-map: [x*r, y*r, z*r]
-add: none
-degree: 2
-bounds: {radius: 1.1}
-"""
-
-
 def write(folder: Path, name: str, text: str) -> Path:
     path = folder / name
     path.write_text(text)
@@ -129,7 +118,7 @@ def write(folder: Path, name: str, text: str) -> Path:
 
 
 def test_formulas_in_files(tmp_path: Path) -> None:
-    path = write(tmp_path, "ball.yaml", BALL)
+    path = write(tmp_path, "ball.yaml", BALL_FILE)
     assert catalog.load_file(path).name == "ball"
     for chain in (
         catalog.load_chain(path),
@@ -144,20 +133,20 @@ def test_formulas_in_files(tmp_path: Path) -> None:
 
 
 def test_an_error_in_a_file_has_line_and_column(tmp_path: Path) -> None:
-    path = write(tmp_path, "ball.yaml", BALL.replace("y*r, z*r", "y*r, z*q"))
+    path = write(tmp_path, "ball.yaml", BALL_FILE.replace("y*r, z*r", "y*r, z*q"))
     with pytest.raises(FormulaError) as caught:
         catalog.load_file(path, shown="ball.yaml")
     assert str(caught.value).startswith("ball.yaml:5:19: map.2: unknown name 'q'")
     with pytest.raises(FormulaError) as caught:
         catalog.resolve({"file": "ball.yaml"}, tmp_path)
     assert str(caught.value).startswith("ball.yaml:5:19: map.2: unknown name 'q'")
-    path.write_text(BALL.replace("degree", "dgree"))
+    path.write_text(BALL_FILE.replace("degree", "dgree"))
     with pytest.raises(FormulaError, match=r"ball.yaml:7:1: unknown key 'dgree'; did you mean 'degree'"):
         catalog.load_file(path, shown="ball.yaml")
 
 
 def test_chains_in_files(tmp_path: Path) -> None:
-    write(tmp_path, "ball.yaml", BALL)
+    write(tmp_path, "ball.yaml", BALL_FILE)
     text = "chain: [{file: ball.yaml, count: 2}, {name: hast}]\nbounds: {radius: 3}\nbailout: 9\n"
     write(tmp_path, "both.yaml", text)
     chain = catalog.resolve({"file": "both.yaml"}, tmp_path)
@@ -180,7 +169,7 @@ def test_paths_out_of_reach_are_refused(name: str, tmp_path: Path) -> None:
 def test_links_out_of_the_folder_and_odd_files_are_refused(tmp_path: Path) -> None:
     folder = tmp_path / "scenes"
     folder.mkdir()
-    (folder / "link.yaml").symlink_to(write(tmp_path, "ball.yaml", BALL))
+    (folder / "link.yaml").symlink_to(write(tmp_path, "ball.yaml", BALL_FILE))
     with pytest.raises(FileError, match="leads out"):
         catalog.resolve({"file": "link.yaml"}, folder)
     for spec in ({"file": "missing.yaml"}, {"file": "."}):

@@ -11,16 +11,9 @@ from numpy.typing import NDArray
 
 from clfractal.formulas import catalog
 from clfractal.formulas.reference import distance
+from tests.formulas.own_formulas import BALL
 
 Float = NDArray[np.float64]
-BALL: dict[str, Any] = {
-    "variables": ["x", "y", "z"],
-    "let": {"r": "sqrt(x*x + y*y + z*z)"},
-    "map": ["x*r", "y*r", "z*r"],
-    "add": "none",
-    "degree": 2,
-    "bounds": {"radius": 1.1},
-}
 
 
 def points(count: int, size: float, seed: int = 1) -> Float:

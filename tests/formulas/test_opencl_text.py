@@ -12,7 +12,7 @@ import pytest
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from tests.formulas.opencl_batch import numbered
-from tests.formulas.test_opencl import FAR, orbit, points_of
+from tests.formulas.orbits import FAR, orbit, points_of
 
 TRIGONOMETRY = re.compile(
     r"\b(?:real|dual)_(?:sin|cos|tan|asin|acos|atan|atan2|exp|log|pow|pow_real|power_\w+)\b"

@@ -20,8 +20,8 @@ from clfractal.formulas.language import parse
 from clfractal.formulas.nodes import Call, Name, Node
 from clfractal.formulas.opencl import write_formula
 from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.orbits import ORBITS, device, usable
 from tests.formulas.rounding import spread
-from tests.formulas.test_opencl import ORBITS, device, usable
 from tests.formulas.trees import VARIABLES, tame_tree
 
 # Three trees make a formula; a formula is applied once to points of space.

@@ -14,7 +14,7 @@ from clfractal.commands.formulas import list_formulas, tell_formula
 from clfractal.errors import ClfractalError
 from clfractal.formulas import catalog
 from clfractal.scene.load import dump_scene, load_scene
-from tests.formulas.test_catalog import BALL
+from tests.formulas.own_formulas import BALL_FILE
 
 SCENE = "version: 1\nformula: {name: NAME, iterations: 5}\ncamera: {}\n"
 
@@ -30,7 +30,7 @@ def place(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def ball(title: str) -> str:
-    return BALL.replace("title: Ball", f"title: {title}")
+    return BALL_FILE.replace("title: Ball", f"title: {title}")
 
 
 def scene_of(place: Path, name: str, **keys: Any) -> Any:
@@ -55,7 +55,7 @@ def test_the_names_of_the_library_win(place: Path) -> None:
 
 def test_the_scene_holds_the_formula_inline(place: Path) -> None:
     path = place / "scenes" / "formulas" / "round.yaml"
-    path.write_text(BALL)
+    path.write_text(BALL_FILE)
     scene = scene_of(place, "round")
     assert path in [Path(each) for each in scene.files]
     text = dump_scene(scene)
@@ -67,7 +67,7 @@ def test_the_scene_holds_the_formula_inline(place: Path) -> None:
 
 def test_members_of_chains_and_files_of_formulas(place: Path) -> None:
     shelf = place / "shelf"
-    (shelf / "round.yaml").write_text(BALL)
+    (shelf / "round.yaml").write_text(BALL_FILE)
     (shelf / "part.yaml").write_text(ball("Part"))
     # A file named by a formula of one's own stands beside that formula.
     (shelf / "both.yaml").write_text("chain: [{file: part.yaml, count: 2}, {name: round}, {name: hast}]\n")
@@ -90,7 +90,7 @@ def test_a_chain_of_ones_own_names_the_formulas_beside_it(
 ) -> None:
     """In `formulas` beside the scene as on the shelf; also for those who have no scene."""
     folder = place / "scenes" / "formulas"
-    (folder / "round.yaml").write_text(BALL)
+    (folder / "round.yaml").write_text(BALL_FILE)
     (folder / "both.yaml").write_text("chain: [{name: round, count: 2}, {name: hast}]\n")
     assert scene_of(place, "both").chain.links[0].bound.formula.title == "Ball"
     monkeypatch.chdir(folder.parent)
@@ -99,7 +99,7 @@ def test_a_chain_of_ones_own_names_the_formulas_beside_it(
 
 
 def test_python_and_the_list_know_them(place: Path) -> None:
-    (place / "shelf" / "round.yaml").write_text(BALL)
+    (place / "shelf" / "round.yaml").write_text(BALL_FILE)
     (place / "elsewhere" / "formulas").mkdir()
     (place / "elsewhere" / "formulas" / "oval.yaml").write_text(ball("Oval") + "extra: 1\n")
     count, inside = clfractal.escape("round", np.array([[0.5, 0, 0], [1.5, 0, 0]]), iterations=20)
@@ -114,7 +114,7 @@ def test_python_and_the_list_know_them(place: Path) -> None:
 
 
 def test_an_unknown_name_is_compared_with_all(place: Path) -> None:
-    (place / "scenes" / "formulas" / "snowflake.yaml").write_text(BALL)
+    (place / "scenes" / "formulas" / "snowflake.yaml").write_text(BALL_FILE)
     for given, nearest in (("snowflak", "snowflake"), ("mandelbx", "mandelbox")):
         with pytest.raises(ClfractalError) as caught:
             scene_of(place, given)
@@ -125,7 +125,7 @@ def test_an_unknown_name_is_compared_with_all(place: Path) -> None:
 
 def test_an_error_in_one_has_its_line_and_column(place: Path) -> None:
     path = place / "shelf" / "round.yaml"
-    path.write_text(BALL.replace("y*r, z*r", "y*r, z*q"))
+    path.write_text(BALL_FILE.replace("y*r, z*r", "y*r, z*q"))
     with pytest.raises(ClfractalError) as caught:
         scene_of(place, "round")
     assert f"{path}:5:19: " in str(caught.value)
@@ -133,7 +133,7 @@ def test_an_error_in_one_has_its_line_and_column(place: Path) -> None:
 
 
 def test_what_cannot_be_used_is_told(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    (place / "shelf" / "ball.yaml").write_text(BALL)
+    (place / "shelf" / "ball.yaml").write_text(BALL_FILE)
     (place / "scenes" / "formulas" / "link.yaml").symlink_to(place / "shelf" / "ball.yaml")
     with pytest.raises(ClfractalError, match="leads out of the scene's folder"):
         scene_of(place, "link")

@@ -21,8 +21,8 @@ from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
 from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.orbits import FAR, ORBITS, STEPS, device, points_of, start_at, usable
 from tests.formulas.rounding import spread
-from tests.formulas.test_opencl import FAR, ORBITS, STEPS, device, points_of, start_at, usable
 from tests.variants import one_of
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]

@@ -18,7 +18,7 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.reference import distance, escape, mp_escape, mp_orbit
 from clfractal.formulas.turns import spans_of
 from clfractal.scene.load import load_scene
-from tests.formulas.test_distance import BALL
+from tests.formulas.own_formulas import BALL
 
 
 class Turn(NamedTuple):

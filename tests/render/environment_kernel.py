@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
+import pytest
 
 from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
 from clfractal.renderers import records
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import PackedEnvironment, material_fields
@@ -120,3 +122,15 @@ def ask(
     cl.enqueue_copy(device.queue, result, buffers[1])
     found = result[:, :given]
     return Answers(found[:3].T, found[3], found[4:7].T, found[7])
+
+
+VARIANTS: list[tuple[Precision, int]] = [("float32", 1), ("float32", 16), ("float32", 4)]
+
+
+def check_usable(precision: Precision, lanes: int) -> None:
+    """Skips a lane count that the engine would not use: on such a driver aborts, or crashes."""
+    if lanes not in accepted_lanes(choose(), precision):
+        pytest.skip(f"{choose().info.name} cannot run {lanes} lanes of {precision}")
+
+
+every_variant = pytest.mark.parametrize(("precision", "lanes"), VARIANTS)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device.select import Device
+from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
 from tests.formulas.opencl_batch import compile_text
 
 Array = npt.NDArray[Any]
@@ -163,3 +165,17 @@ class Sampler:
         cl.enqueue_nd_range_kernel(self.device.queue, kernel, (n // self.lanes,), (1,))
         cl.enqueue_copy(self.device.queue, result, buffers[1])
         return result.astype(np.float64)
+
+
+@lru_cache
+def samplers() -> list[Sampler]:
+    """One for each number type and lane count that the device accepts."""
+    device = choose()
+    precisions: list[Precision] = ["float32", "float64"] if has_float64(device.info) else ["float32"]
+    found = [
+        Sampler(device, precision, lanes)
+        for precision in precisions
+        for lanes in accepted_lanes(device, precision)
+    ]
+    assert found
+    return found

@@ -222,3 +222,7 @@ def to_sphere(
 
 def view_of(scene: Scene) -> View:
     return camera_view(scene.camera, scene.image.width, scene.image.height)
+
+
+def colors(film: Film) -> Floats:
+    return stacked(film, ("R", "G", "B")).astype(float)

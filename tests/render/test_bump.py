@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -16,61 +15,15 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.errors import ClfractalError
 from clfractal.renderers.points import distances
 from clfractal.scene.load import dump_scene
-from clfractal.scene.model import Scene
-from tests.render.test_maps import BULB, ramp
-from tests.render.test_paths import GREY, path, scene_of, seen
+from tests.render.color_maps import BULB, ramp
+from tests.render.path_scenes import path, seen
+from tests.render.reliefs import EYE, Floats, degrees, displaced, facts, relief, unit
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 
-EYE = np.array([0.0, -4.0, 0.0])
-CHANNELS = tuple(f"{name}.{axis}" for name in ("N", "P", "normal") for axis in "XYZ")
 TRAP: dict[str, Any] = {"by": "trap", "trap": {"shape": "plane"}, "curve": [[0, 0], [1, 0.3]]}
-
-
-def relief(height: Any, width: float | None = None, **sections: Any) -> Scene:
-    """A ball with a relief."""
-    bump = {"height": height, "width": width}
-    values = {
-        "lighting": path(),
-        "background": GREY,
-        "materials": {"m": {"bump": bump}},
-        "material": {"name": "m"},
-        "renderer": {"samples": 1, "detail": 0.01},
-        **sections,
-    }
-    return scene_of(**values)
-
-
-def facts(scene: Scene, **options: Any) -> dict[str, Floats]:
-    """The surface's own normals (`N`), places (`P`) and the relief's normals (`normal`), shape (n, 3) each."""
-    film = clfractal.render(scene, channels=("A", *CHANNELS), **options)
-    whole = np.asarray(film["A"]) == 1
-    assert whole.sum() > 300
-    return {
-        name: np.stack([np.asarray(film[f"{name}.{axis}"], np.float64)[whole] for axis in "XYZ"], axis=-1)
-        for name in ("N", "P", "normal")
-    }
-
-
-def unit(a: Floats) -> Floats:
-    return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))
-
-
-def displaced(found: dict[str, Floats], gradient: Floats, eye: Floats = EYE) -> Floats:
-    """Normals of the surface moved up by a height with that gradient in space, lowered where they turn from the viewer."""
-    n = found["N"]
-    slope = gradient - n * (n * gradient).sum(axis=-1, keepdims=True)
-    toward = unit(eye - found["P"])
-    facing, turned = (n * toward).sum(axis=-1), (slope * toward).sum(axis=-1)
-    lowered = np.where(turned > 0.9 * facing, 0.9 * facing / np.where(turned > 0, turned, 1), 1.0)
-    return unit(n - lowered[:, None] * slope)
-
-
-def degrees(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))
 
 
 Z = np.array([0.0, 0.0, 1.0])

@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.scene.materials import PbrMaterial
+from tests.render.lobes import LOBES, NO_GLOSS, hemisphere, material, toward
 from tests.render.material_kernel import NORMAL, ask, turned
-from tests.render.test_materials import LOBES, NO_GLOSS, hemisphere, material, toward
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

@@ -15,8 +15,8 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
 from tests.formulas.opencl_batch import batch_text, compile_text, kernel_file, launch
 from tests.render.planes import plane_scene
+from tests.render.point_checks import agree, orbit_bytes
 from tests.render.shots import shoot
-from tests.render.test_points import agree, orbit_bytes
 from tests.voxels.grids import filled, volume_scene
 
 Floats = npt.NDArray[np.float64]

@@ -7,7 +7,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -15,14 +14,13 @@ from clfractal.device.select import choose
 from clfractal.device.tune import accepted_lanes
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
-from tests.render.test_glass_objects import BODIES, colors_of, glass, scene
-from tests.render.test_glass_paths import ball
-from tests.render.test_paths import BLACK, path, scene_of, seen
+from tests.render.glass_scenes import BODIES, ball, colors_of, glass, scene
+from tests.render.half_space import depth_function
+from tests.render.path_scenes import BLACK, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 
 WHITE = {"scatter": [1, 1, 1]}
 E = float(np.exp(-1))
@@ -92,17 +90,6 @@ def test_light_that_is_not_scattered_obeys_beer_and_lambert(precision: str) -> N
     expected = np.exp(-extinction * width)
     assert 0 < colors[:4].mean() < 0.002
     np.testing.assert_allclose(colors[14:18, 14:18].mean(axis=(0, 1)), expected, rtol=0.03, atol=0.001)
-
-
-def depth_function(albedo: float, cosines: Floats) -> Floats:
-    """Chandrasekhar's H for isotropic scattering (Radiative Transfer, 1950, chapter V), at given cosines."""
-    nodes, weights = np.polynomial.legendre.leggauss(48)
-    x, w = (nodes + 1) / 2, weights / 2
-    h = np.ones_like(x)
-    for _ in range(400):
-        h = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (w * x * h / (x[:, None] + x)).sum(axis=1))
-    sums = (w * x * h / (cosines[..., None] + x)).sum(axis=-1)
-    return np.asarray(1 / (np.sqrt(1 - albedo) + albedo / 2 * sums))
 
 
 def test_a_sea_of_milk_is_as_bright_as_chandrasekhars() -> None:

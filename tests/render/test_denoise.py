@@ -18,8 +18,8 @@ from clfractal.files.exr import read_exr
 from clfractal.pictures.denoise import denoised
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
+from tests.render.path_scenes import path, scene_of
 from tests.render.shots import engine_of
-from tests.render.test_paths import path, scene_of
 
 pytestmark = pytest.mark.light
 

@@ -17,27 +17,16 @@ from scipy import stats
 
 from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
-from clfractal.device.tune import accepted_lanes
 from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from clfractal.scene.environment import EnvironmentMap, read_map
 from clfractal.scene.lighting import Environment
-from tests.render.environment_kernel import ask, settings_of
+from tests.render.environment_kernel import VARIANTS, ask, check_usable, every_variant, settings_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-VARIANTS: list[tuple[Precision, int]] = [("float32", 1), ("float32", 16), ("float32", 4)]
 if has_float64(choose().info):
     VARIANTS += [("float64", 8)]
-
-
-def check_usable(precision: Precision, lanes: int) -> None:
-    """Skips a lane count that the engine would not use: on such a driver aborts, or crashes."""
-    if lanes not in accepted_lanes(choose(), precision):
-        pytest.skip(f"{choose().info.name} cannot run {lanes} lanes of {precision}")
-
-
-every_variant = pytest.mark.parametrize(("precision", "lanes"), VARIANTS)
 
 
 def a_map(height: int = 16, seed: int = 3) -> npt.NDArray[np.float32]:

@@ -12,8 +12,8 @@ from scipy.stats import chi2
 
 from clfractal.renderers.glass import fresnel_across, seen_colors, wavelengths
 from clfractal.scene.materials import PbrMaterial
+from tests.render.lobes import COSINES, numbers, toward
 from tests.render.material_kernel import NORMAL, ask, turned
-from tests.render.test_materials import COSINES, numbers, toward
 from tests.variants import one_of
 
 Floats = npt.NDArray[np.floating[Any]]

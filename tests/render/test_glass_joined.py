@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.render.test_glass_objects import BODIES, FAR_OFF, Floats, colors_of, glass, scene
-from tests.render.test_paths import BALL, GREY, path, scene_of
+from tests.render.glass_scenes import BODIES, FAR_OFF, Floats, colors_of, glass, scene
+from tests.render.path_scenes import BALL, GREY, path, scene_of
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

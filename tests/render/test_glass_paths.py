@@ -14,27 +14,14 @@ from clfractal.device.select import choose
 from clfractal.errors import SceneError
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
-from clfractal.scene.model import Scene
 from tests.portability.pictures import picture
-from tests.render.test_paths import BALL, GREY, path, scene_of, seen
+from tests.render.glass_scenes import ball
+from tests.render.path_scenes import BALL, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
 
 Floats = npt.NDArray[np.float64]
-
-
-def ball(roughness: float, ior: float = 1.5, *, bounces: int = 48, **sections: Any) -> Scene:
-    """A ball of radius 1 of glass; `transmission` has more of it."""
-    clear = {"weight": 1, **sections.pop("transmission", {})}
-    material = {"base": {"color": [1, 1, 1]}, "specular": {"roughness": roughness, "ior": ior}}
-    return scene_of(
-        materials={"glass": {**material, "transmission": clear}},
-        material={"name": "glass"},
-        lighting=path(bounces),
-        image={"width": 32, "height": 32},
-        **{"background": GREY, **sections},
-    )
 
 
 @pytest.mark.parametrize(("roughness", "weight"), [(0, 0.5), (0.3, 1), (0.7, 0.5), (1, 1)])

@@ -16,7 +16,7 @@ from clfractal.pictures.store import JournalFilm
 from clfractal.scene.model import Scene
 from clfractal.work.job import Job
 from clfractal.work.prepare import prepare
-from tests.render.test_job_data import SCENES, scene_of
+from tests.render.job_scenes import SCENES, scene_of
 
 KEYS = {"scene", "environment", "grid", "version", "device", "driver", "lanes"}
 

@@ -17,8 +17,8 @@ from clfractal.files.channels import ALBEDO, LIGHT_LAYERS, NORMAL, RAY_CHANNELS,
 from clfractal.pictures.film import Film
 from clfractal.renderers.passes import kept_numbers
 from clfractal.scene.model import Scene
+from tests.render.path_scenes import BLACK, path, scene_of
 from tests.render.shots import plan_of, repeated, shoot
-from tests.render.test_paths import BLACK, path, scene_of
 from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]

@@ -15,8 +15,8 @@ from clfractal.scene.layout import Place
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.run import Progress
+from tests.render.layouts import GAP, VIEWS, scene_of
 from tests.render.shots import engine_of
-from tests.render.test_layout_views import GAP, VIEWS, scene_of
 
 SIZE = (140, 80)
 PLACES = [Place(0, 0, 44, 80), Place(48, 0, 44, 80), Place(96, 0, 44, 80)]

@@ -20,12 +20,12 @@ from clfractal.renderers.maps import level_sizes, levels_of
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.work.prepare import prepare
-from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
+from tests.render.color_maps import BULB, Floats, ramp
+from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 
 DARK: dict[str, Any] = {"base": {"weight": 0}, "specular": {"weight": 0}}
 RAMP = [[0.1, 0.5, 0.9], [0.7, 0.2, 0.3], [0.2, 0.8, 0.4]]
@@ -65,11 +65,6 @@ def shown(scene: Scene, **options: Any) -> tuple[Floats, dict[str, Floats]]:
     return np.stack([found[name][whole] for name in "RGB"], axis=-1), facts
 
 
-def ramp(place: Floats, stops: list[list[float]]) -> Floats:
-    at = np.linspace(0, 1, len(stops))
-    return np.stack([np.interp(place, at, [stop[i] for stop in stops]) for i in range(3)], axis=-1)
-
-
 def quantity(by: str, facts: dict[str, Floats], vector: list[float]) -> Floats:
     given = np.array(vector)
     if by == "normal":
@@ -85,10 +80,6 @@ BY: dict[str, dict[str, Any]] = {
     "normal": {"direction": [1, 0, 2], "range": [-0.5, 1]},
     "height": {"direction": [0, 1, -3], "range": [1, -1]},
     "distance": {"center": [0.4, -1, 0.3], "range": [0.3, 1.4]},
-}
-BULB: dict[str, Any] = {
-    "formula": {"name": "mandelbulb", "iterations": 7},
-    "camera": {"position": [1.3, -2.6, 0.5], "fov": 50},
 }
 
 

@@ -22,8 +22,8 @@ from clfractal.renderers import carried
 from clfractal.renderers.mattes import bits_of, identifier, murmur3, ranked
 from clfractal.renderers.state import state_numbers
 from clfractal.renderers.surface import program_texts
+from tests.render.path_scenes import path, scene_of
 from tests.render.shots import plan_of, repeated
-from tests.render.test_paths import path, scene_of
 from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]

@@ -11,8 +11,8 @@ import numpy.typing as npt
 import pytest
 
 from tests.render.facet_walks import Walks, walked
+from tests.render.lobes import material, numbers, toward
 from tests.render.material_kernel import ask, turned
-from tests.render.test_materials import material, numbers, toward
 
 pytestmark = pytest.mark.light
 

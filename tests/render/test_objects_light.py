@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
+from tests.render.known_lights import CASES
 from tests.render.objects_oracle import NOWHERE, met
-from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, points_of, rays, scene_of, shoot
-from tests.render.test_light_shapes import CASES
-from tests.render.test_surface_rays import colors
+from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, colors, points_of, rays, scene_of, shoot
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
 FLOOR = {"type": "plane", "position": [0, 0, -0.5], "material": "white"}

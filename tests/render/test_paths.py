@@ -14,51 +14,16 @@ import yaml
 
 import clfractal
 from clfractal.errors import SceneError
-from clfractal.scene.model import Scene
+from tests.render.path_scenes import BALL, GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
-
-Floats = npt.NDArray[np.float64]
-
-BALL = {"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]}
-BLACK = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
-GREY = {"top": [1, 1, 1], "bottom": [1, 1, 1]}
-
-
-def scene_of(**sections: Any) -> Scene:
-    """A ball of radius 1 in 48 x 48 pixels, unless the sections say otherwise."""
-    values: dict[str, Any] = {
-        "version": 1,
-        "formula": BALL,
-        "camera": {"position": [0, -4, 0], "fov": 40},
-        "image": {"width": 48, "height": 48},
-        "lights": [],
-        "background": BLACK,
-        **sections,
-    }
-    return clfractal.Scene(**values)
-
-
-def seen(scene: Scene, samples: int) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
-    """Colours, shape (n, 3), and normals of the pixels that see the set wholly; and which pixels these are."""
-    renderer = scene.surface.model_copy(update={"samples": samples})
-    channels = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z")
-    film = clfractal.render(scene.model_copy(update={"renderer": renderer}), channels=channels)
-    whole = np.asarray(film["A"]) == 1
-    colors = np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64)
-    normals = np.stack([film[f"N.{axis}"] for axis in "XYZ"], axis=-1).astype(np.float64)
-    return colors[whole], normals[whole], whole
 
 
 def save_map(path: Path, pixels: npt.NDArray[np.float32]) -> None:
     """A grey environment map."""
     header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
     OpenEXR.File(header, dict.fromkeys("RGB", pixels)).write(str(path))
-
-
-def path(bounces: int = 0, **values: Any) -> dict[str, Any]:
-    return {"mode": "path", "bounces": bounces, **values}
 
 
 @pytest.mark.parametrize(

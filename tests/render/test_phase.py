@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from tests.render.test_sampling import samplers
+from tests.render.sampler import samplers
 
 Floats = npt.NDArray[np.floating[Any]]
 COUNT = 1 << 14

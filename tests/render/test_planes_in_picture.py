@@ -16,11 +16,10 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
 from clfractal.renderers.plan import choose_precision
-from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.palette import named_table
 from tests.render.planes import mandelbrot, sure
+from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
 from tests.render.shots import (
     BALL,
     BALL_ITERATIONS,
@@ -55,23 +54,8 @@ RENDERERS: dict[str, dict[str, Any]] = {
 }
 # How far from the ball a renderer may find its surface.
 OFF = {"surface": 0.004, "volume": 0.04}
-COLORS = {"mode": "stepped", "palette": "magma", "inside": [0.9, 0.1, 0.3], "scale": 1.5}
-TINT = np.array([0.25, 0.5, 0.75])
-LOOK: dict[str, Any] = {
-    "material": {"ambient": 1, "diffuse": 0, "specular": 0, "color": list(TINT)},
-    # A shadow, of which ambient light shows nothing: tests with shadows have the same program.
-    "lights": [{"direction": [0, 1, -0.5], "shadow": True}],
-    "background": {"top": [0.5, 0.25, 0.125], "bottom": [0.5, 0.25, 0.125]},
-}
-BACKGROUND = np.array(LOOK["background"]["top"])
 # Planes of a test are filled up to as many, by some that are not seen: each number of planes is a program.
 PLANES = 4
-
-
-def plane(center: list[float], normal: list[float], opacity: float = 0.8, **keys: Any) -> dict[str, Any]:
-    place = {"center": center, "normal": normal, "up": [0.1, 0.2, 1], "width": 2.4, "height": 1.6}
-    place |= {name: keys.pop(name) for name in list(keys) if name in place}
-    return {"plane": place, "colors": COLORS, "opacity": opacity, **keys}
 
 
 def picture(
@@ -100,41 +84,6 @@ def picture(
         },
         folder=folder,
     )
-
-
-def escape_tint(scene: Scene, points: Floats, limit: int = BALL_ITERATIONS) -> tuple[Floats, Floats]:
-    """The planes' colours at points, and how near to the rim of a ring they are, in parts of the radius."""
-    flat = np.where(np.isfinite(points), points, 9).reshape(-1, 3)
-    count, inside = reference.escape(scene.chain, flat, limit)
-    at = np.clip(1.5 * count / limit, 0, 1) * 255
-    table = named_table("magma").astype(float)
-    tint = np.stack([np.interp(at, np.arange(256), table[:, i]) for i in range(3)], -1)
-    tint[inside] = COLORS["inside"]
-    radius = np.linalg.norm(flat, axis=-1)
-    rims = 4.0 ** (2.0 ** -np.arange(limit + 1))
-    rim = np.abs(radius[:, None] / rims - 1).min(-1)
-    return tint.reshape(points.shape), rim.reshape(points.shape[:-1])
-
-
-def alpha_of(each: CutPlane, tint: Floats) -> Floats:
-    """A quad's opacity at points of these colours."""
-    inside = (tint == np.array(COLORS["inside"])).all(-1)
-    return np.where(inside & (each.inside_opacity is not None), each.inside_opacity or 0.0, each.opacity)
-
-
-def met(scene: Scene, index: int, number: int = 0) -> tuple[npt.NDArray[np.bool_], Floats, Floats]:
-    """Which rays meet a plane's rectangle, at which distance; and how near to its rim, scene units."""
-    origin, direction, _ = rays(scene)
-    part = scene.cut_planes[index]
-    placed = part.plane.placed
-    center = np.array(placed.center) + number * part.spacing * np.array(placed.normal)
-    with np.errstate(divide="ignore"):
-        t = ((center - origin) @ placed.normal) / (direction @ placed.normal)
-    there = origin + t[..., None] * direction - center
-    room = np.minimum(
-        placed.width / 2 - np.abs(there @ placed.side), placed.height / 2 - np.abs(there @ placed.up)
-    )
-    return (room > 0) & (t > 0), t, np.abs(room)
 
 
 def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:

@@ -7,7 +7,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.orbit import EXTRA_APPLICATIONS
@@ -17,11 +16,10 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import points, records
+from clfractal.renderers import points
+from tests.formulas.escape_tables import CASES, TABLES, chain_of
 from tests.formulas.opencl_batch import batch_text, compile_text, kernel_file, launch
-from tests.formulas.test_counts import CASES, TABLES, chain_of
-
-Floats = npt.NDArray[np.float64]
+from tests.render.point_checks import Floats, agree, orbit_bytes
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
@@ -43,10 +41,6 @@ def only(kernel: str) -> str:
     kept = [part for part in parts[1:] if part.startswith(f"__kernel void {kernel}(")]
     assert len(kept) == 1
     return parts[0] + kept[0]
-
-
-def orbit_bytes(chain: Chain, iterations: int, precision: Precision, bailout: float | None) -> Any:
-    return records.orbit_record(chain, iterations, precision, bailout).reshape(1).view(np.uint8)
 
 
 def table(case: str) -> Floats:
@@ -188,21 +182,6 @@ def test_distances_and_normals(name: str) -> None:
     assert 0.2 < np.median(step[outside] / full[outside]) < 5
     if not formula.has_derivative:
         np.testing.assert_array_equal(step, full)
-
-
-def agree(full: Floats, normal: Floats, expected: Floats, gradient: Floats, tolerance: float = 1e-6) -> None:
-    """All but a few points, those at a kink or where an orbit is chaotic, agree."""
-    assert np.isfinite(full).all()
-    assert np.isfinite(normal).all()
-    outside = (full > 0) & (expected > 0)
-    assert outside.sum() > 20
-    assert ((full > 0) == (expected > 0)).mean() >= 0.99
-    relative = np.abs(full / np.where(outside, expected, 1.0) - 1)[outside]
-    assert (relative < tolerance).mean() >= 0.97, f"distances off by {np.quantile(relative, 0.97):.1e}"
-    with np.errstate(all="ignore"):
-        unit = gradient / np.linalg.norm(gradient, axis=1, keepdims=True)
-    off = np.abs(normal - unit).max(axis=1)[outside]
-    assert (off < tolerance).mean() >= 0.97, f"normals off by {np.quantile(off, 0.97):.1e}"
 
 
 @pytest.mark.parametrize("name", ["mandelbulb", "menger_sponge", "bulbox"])

@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 import math
-from functools import lru_cache
 
 import numpy as np
 import pytest
 from scipy import stats
 
-from clfractal.device.select import choose, has_float64
-from clfractal.device.structs import Precision
-from clfractal.device.tune import accepted_lanes
-from tests.render.sampler import Array, Sampler
+from tests.render.sampler import Array, Sampler, samplers
 from tests.render.sequence import truth
 
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 DIGITS = {"float32": 23, "float64": 31}
 WIDTH = 3.0
 BLACKMAN_HARRIS = np.array([0.35875, 0.48829, 0.14128, 0.01168])
-
-
-@lru_cache
-def samplers() -> list[Sampler]:
-    """One for each number type and lane count that the device accepts."""
-    device = choose()
-    precisions: list[Precision] = ["float32", "float64"] if has_float64(device.info) else ["float32"]
-    found = [
-        Sampler(device, precision, lanes)
-        for precision in precisions
-        for lanes in accepted_lanes(device, precision)
-    ]
-    assert found
-    return found
 
 
 def points_sampler() -> Sampler:

@@ -16,7 +16,7 @@ from clfractal.scene import places
 from clfractal.scene.coloring import Trap
 from clfractal.scene.model import Scene
 from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, scene_of, shoot, stacked
-from tests.render.test_coloring import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
+from tests.render.traps import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

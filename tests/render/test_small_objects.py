@@ -12,8 +12,16 @@ from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, QUICK_BALL, points_of, scene_of, shoot
-from tests.render.test_surface_rays import colors
+from tests.render.shots import (
+    BALL,
+    BALL_ITERATIONS,
+    BALL_RADIUS,
+    QUICK_BALL,
+    colors,
+    points_of,
+    scene_of,
+    shoot,
+)
 from tests.variants import combinations, one_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}

@@ -12,7 +12,7 @@ from clfractal.optics.view import View, camera_view, scene_view, seen_by, shown_
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Eye, EyeName
 from tests.render.shots import BALL, scene_of
-from tests.render.test_stereo_views import CAMERA, PLANE, SIDES, dot, unit
+from tests.render.stereo_geometry import CAMERA, PLANE, SIDES, dot, unit
 
 
 class TestScenes:

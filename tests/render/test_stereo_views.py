@@ -10,50 +10,27 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given as given_any
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
-from clfractal.optics.stereo import (
-    NEAREST,
-    attitude,
-    degrees,
-    frustum,
-    parallax,
-    relation,
-)
-from clfractal.optics.view import (
-    View,
-    camera_view,
-    eye_view,
-    middle_view,
-)
+from clfractal.optics.stereo import NEAREST, attitude, degrees, frustum, parallax, relation
+from clfractal.optics.view import View, camera_view, eye_view, middle_view
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, EyeName, Stereo
 from tests.render.shots import BALL, ORTHOGRAPHIC, scene_of
+from tests.render.stereo_geometry import CAMERA, SIDES, Floats, dot, unit
 
-Floats = npt.NDArray[np.float64]
 Views = dict[EyeName, View]
-
-SIDES: tuple[EyeName, EyeName] = ("left", "right")
-CAMERA: dict[str, Any] = {
-    "position": [1.0, -4.0, 2.0],
-    "target": [0.2, 0.1, -0.3],
-    "up": [0.1, 0.0, 1.0],
-    "fov": 50.0,
-}
+coordinate = st.floats(-8, 8)
+vector = st.tuples(coordinate, coordinate, coordinate)
 
 
 def given(*strategies: st.SearchStrategy[Any]) -> Callable[[Any], Any]:
     """As hypothesis's own; there are many of these, and each is about smooth functions."""
     return lambda test: limits(max_examples=25)(given_any(*strategies)(test))
-
-
-def dot(a: Floats, b: Floats) -> float:
-    return float((a * b).sum())
 
 
 @dataclass
@@ -73,11 +50,6 @@ class Setting:
         return {name: eye_view(middle, stereo, Eye(name)) for name in ("left", "right", "middle")}
 
 
-def unit(vector: Any) -> Floats:
-    found: Floats = np.array(vector, float) / np.linalg.norm(vector)
-    return found
-
-
 def apart(camera: dict[str, Any]) -> bool:
     """Whether the camera looks somewhere, and not along its `up`."""
     toward = np.subtract(camera["target"], camera["position"])
@@ -85,8 +57,6 @@ def apart(camera: dict[str, Any]) -> bool:
     return distance > 0.1 and float(np.linalg.norm(np.cross(toward / distance, unit(camera["up"])))) > 0.1
 
 
-coordinate = st.floats(-8, 8)
-vector = st.tuples(coordinate, coordinate, coordinate)
 cameras = st.fixed_dictionaries(
     {
         "position": vector,
@@ -416,12 +386,3 @@ class TestParallax:
         assert degrees(stereo, -2) == pytest.approx(90 - np.degrees(2 * np.arctan(2)))
         # One degree of a viewer at a desk is about a hundredth of the distance.
         assert degrees(DESK.section(), 0.6 * np.radians(1)) == pytest.approx(1, abs=0.02)
-
-
-# Neither of length 1 nor perpendicular.
-PLANE: dict[str, Any] = {
-    "center": [0.3, -0.1, 0.2],
-    "normal": [0.5, -2, 1],
-    "up": [0.3, 0.1, 2],
-    "width": 3.0,
-}

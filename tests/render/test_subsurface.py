@@ -19,8 +19,8 @@ from clfractal.errors import SceneError
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
-from tests.render.test_glass_objects import BODIES, colors_of, scene
-from tests.render.test_paths import BALL, BLACK, GREY, path, scene_of, seen
+from tests.render.glass_scenes import BODIES, colors_of, scene
+from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -52,7 +52,7 @@ def set_of(material: dict[str, Any], bounces: int = 8, **sections: Any) -> Scene
 
 def test_inversion_is_that_of_thick_bodies() -> None:
     """Albedos by the formula that kernels have, beside Chandrasekhar's half spaces that scatter all around (1950, V)."""
-    from tests.render.test_cloudy import depth_function
+    from tests.render.half_space import depth_function
 
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosines = (nodes + 1) / 2

@@ -16,8 +16,7 @@ from clfractal.scene.atmosphere import SUN_RADIUS
 from clfractal.scene.lighting import Sky
 from clfractal.scene.sky import bake, pixel_areas
 from clfractal.scene.sun import SOLID_ANGLE, Sun, sun_of
-from tests.render.environment_kernel import ask, settings_of
-from tests.render.test_environment_kernel import check_usable, every_variant
+from tests.render.environment_kernel import ask, check_usable, every_variant, settings_of
 
 pytestmark = pytest.mark.light
 

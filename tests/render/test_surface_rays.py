@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal import resources
@@ -23,6 +22,7 @@ from clfractal.renderers.march import march_record
 from clfractal.renderers.records import HemisphereRays, hemisphere_rays
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from tests.render.known_lights import BRIGHT, ground
 from tests.render.shots import (
     BALL,
     ORTHOGRAPHIC,
@@ -32,6 +32,7 @@ from tests.render.shots import (
     SPHERE_CENTER,
     SPHERE_RADIUS,
     Floats,
+    colors,
     normals_of,
     plan_of,
     points_of,
@@ -39,15 +40,8 @@ from tests.render.shots import (
     render_planned,
     scene_of,
     shoot,
-    stacked,
     to_sphere,
 )
-
-BRIGHT = {"color": [1, 1, 1], "ambient": 0, "diffuse": 0, "specular": 0}
-
-
-def colors(film: Film) -> Floats:
-    return stacked(film, ("R", "G", "B")).astype(float)
 
 
 def solids(light: dict[str, Any] | list[dict[str, Any]], material: dict[str, Any], **occlusion: Any) -> Scene:
@@ -59,13 +53,6 @@ def solids(light: dict[str, Any] | list[dict[str, Any]], material: dict[str, Any
         material={**BRIGHT, **material},
         renderer={"samples": 16, "detail": 0.25, "ambient_occlusion": occlusion or {"rays": 1}},
     )
-
-
-def ground(film: Film) -> npt.NDArray[np.bool_]:
-    """Where the top of the box is seen, away from its edges."""
-    points = points_of(film)
-    inner = (np.abs(points[..., :2]) < 1.15).all(axis=-1)
-    return np.asarray((film["A"] == 1) & (np.abs(points[..., 2]) < 0.011) & inner)
 
 
 def disk(count: int) -> Floats:

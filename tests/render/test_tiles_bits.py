@@ -18,6 +18,7 @@ from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.work import drawing
 from clfractal.work.run import Progress
+from tests.render.bits import close, same
 from tests.render.shots import (
     CHANNELS,
     ORTHOGRAPHIC,
@@ -75,11 +76,6 @@ SCENES: dict[str, Scene] = {
 def wholes(device: Device) -> dict[str, npt.NDArray[np.float32]]:
     """Each scene in one go."""
     return {name: stacked(shoot(scene, device)) for name, scene in SCENES.items()}
-
-
-def same(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> bool:
-    """Equal bits, which tells 0 from -0."""
-    return a.shape == b.shape and np.array_equal(a.view(np.uint32), b.view(np.uint32))
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -255,14 +251,3 @@ def test_size_of_the_picture_moves_nothing(device: Device, camera: dict[str, Any
     assert hit.sum() > 40
     difference = np.abs(a[hit] - b[hit])[:, CHANNELS.index("Z")]
     assert np.median(difference) < 5e-3
-
-
-def close(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> None:
-    """Colours, points and normals agree to a hundredth in all but 0.5 % of the pixels, and to a thousandth in the mean."""
-    chosen = [CHANNELS.index(name) for name in ("R", "G", "B", "A", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z")]
-    difference = np.abs(a[..., chosen] - b[..., chosen])
-    assert np.isfinite(difference).all()
-    assert (difference.max(axis=-1) > 0.01).mean() < 0.005
-    assert difference.mean() < 0.001
-    depth = CHANNELS.index("Z")
-    assert (np.isfinite(a[..., depth]) != np.isfinite(b[..., depth])).mean() < 0.005

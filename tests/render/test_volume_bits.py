@@ -19,8 +19,8 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
 from clfractal.work import drawing
+from tests.render.bits import close, same
 from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, render_tile, shoot, stacked
-from tests.render.test_tiles_bits import close, same
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
 
 SIZE = (70, 40)

@@ -21,10 +21,7 @@ from clfractal.scene.model import Scene
 from clfractal.viewer import studio as studio_module
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.pacing import Pacing
-from clfractal.viewer.panels import (
-    scene_dock,
-    theme,
-)
+from clfractal.viewer.panels import scene_dock, theme
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
