@@ -8,17 +8,13 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyopencl as cl
 
-from clfractal.device import compiler, program
 from clfractal.device.select import Device
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.formulas.opencl import FormulaText
 from clfractal.renderers.declarations import struct_text
 from clfractal.resources import folder
-
-Floats = npt.NDArray[np.floating[Any]]
+from tests.small_kernels import Floats, SmallKernels
 
 _DEFINED = re.compile(
     r"^(?:(?:INLINE|CALLED) \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);|^STAGE\((\w+)\)",
@@ -63,49 +59,29 @@ def batch_text(formulas: Sequence[FormulaText], tail: str) -> str:
     return HEAD + "\n".join(parts)
 
 
-def compile_text(
+def formula_kernels(
     device: Device, text: str, precision: Precision, lanes: int, flags: Sequence[str] = ()
-) -> Any:
-    """The driver's program of a generated text; BuildFailureError with the log if it does not compile."""
-    flat = flatten(
-        "batch.cl",
-        generated={"batch.cl": text, "structs.h": struct_text()},
-        defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")},
-    )
-    return compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])
+) -> SmallKernels:
+    """The program of a generated text."""
+    return SmallKernels(device, text, precision, lanes, generated={"structs.h": struct_text()}, flags=flags)
 
 
-def planes_of(points: Floats, precision: Precision, lanes: int) -> Floats:
-    """Points of shape (n, 3) as planes of shape (3, m), m a multiple of the lanes."""
-    padded = np.zeros((3, -(-len(points) // lanes) * lanes), precision)
-    padded[:, : len(points)] = points.T
-    return padded
-
-
-def launch(
-    device: Device,
-    built: Any,
-    kernel_name: str,
+def at_points(
+    kernels: SmallKernels,
+    name: str,
     points: Floats,
     planes: int,
-    precision: Precision,
-    lanes: int,
     *constants: npt.NDArray[Any],
     kind: str | None = None,
 ) -> npt.NDArray[Any]:
     """Runs a kernel (points, result, stride, constants...) and gives its planes, shape (planes, n).
 
     Args:
+        points: of shape (n, 3).
         kind: type of the result's numbers; None: the one of the points.
     """
-    padded = planes_of(points, precision, lanes)
-    result = np.full((planes, padded.shape[1]), np.nan if kind is None else -1, kind or precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    arrays = [padded, result, *constants]
-    buffers = [cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array)) for array in arrays]
-    kernel = cl.Kernel(built, kernel_name)
-    kernel.set_args(*buffers[:2], np.int32(padded.shape[1]), *buffers[2:])
-    # Work-groups of one: the cheapest to compile for.
-    cl.enqueue_nd_range_kernel(device.queue, kernel, (padded.shape[1] // lanes,), (1,))
-    cl.enqueue_copy(device.queue, result, buffers[1])
+    given = kernels.planes(points.T)
+    count = given.shape[1]
+    result = np.full((planes, count), np.nan if kind is None else -1, kind or kernels.precision)
+    kernels.run(name, given, result, np.int32(count), *constants, result=result)
     return result[:, : len(points)]

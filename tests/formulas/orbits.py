@@ -15,7 +15,8 @@ from clfractal.formulas import catalog
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import space_to_state
-from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
+from tests.small_kernels import LOADS, SmallKernels
 
 # Of |z|: beyond it an orbit has ended in every use of these functions.
 FAR = 1000.0
@@ -62,26 +63,20 @@ SPECS: dict[str, Any] = {
 }
 
 # The states of every step, over real and dual numbers, and the scalar derivative.
-ORBITS = """
-INLINE void store_value(__global scalar *to, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
-}
+ORBITS = (
+    f"\n{LOADS}"
+    """\
 INLINE void store_dual(__global scalar *to, int stride, dual value) {
-    store_value(to, value.v);
-    store_value(to + stride, value.dx);
-    store_value(to + 2 * stride, value.dy);
-    store_value(to + 3 * stride, value.dz);
+    store(to, value.v);
+    store(to + stride, value.dx);
+    store(to + 2 * stride, value.dy);
+    store(to + 3 * stride, value.dz);
 }
-#define STORE(s) store_value(to, z.s); store_dual(to + stride, stride, dual_z.s); to += 5 * stride;
+#define STORE(s) store(to, z.s); store_dual(to + stride, stride, dual_z.s); to += 5 * stride;
 __kernel void orbits(__global const scalar *points, __global scalar *result, int stride, __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;
-    scalar each[3][LANES];
-    for (int lane = 0; lane < LANES; ++lane) {
-        for (int axis = 0; axis < 3; ++axis) each[axis][lane] = points[axis * stride + first + lane];
-    }
-    const vec point = vec_of(lanes_load(each[0]), lanes_load(each[1]), lanes_load(each[2]));
+    points += first;
+    const vec point = vec_of(load(points), load(points + stride), load(points + 2 * stride));
     state c, z;
     dual_state dual_c, dual_z;
     start(point, k, &c, &z);
@@ -93,7 +88,7 @@ __kernel void orbits(__global const scalar *points, __global scalar *result, int
 #if STATE_SIZE == 4
         STORE(s3)
 #endif
-        store_value(to, growth);
+        store(to, growth);
         to += stride;
         const state before = z;
         z = apply(n + FIRST_COUNT, z, c, k);
@@ -104,6 +99,7 @@ __kernel void orbits(__global const scalar *points, __global scalar *result, int
     }
 }
 """
+)
 
 
 @dataclass(frozen=True)
@@ -149,22 +145,21 @@ def points_of(chain: Chain) -> Floats:
 
 
 @lru_cache
-def program_of(form: str, precision: Precision) -> tuple[Any, int]:
+def kernels_of(form: str, precision: Precision) -> SmallKernels:
     lanes = accepted_lanes(device(), precision)
     chosen = lanes[min(1, len(lanes) - 1)]
     text = f"#define STEPS {STEPS}\n" + batch_text(list(texts(form).values()), ORBITS)
-    return compile_text(device(), text, precision, chosen), chosen
+    return formula_kernels(device(), text, precision, chosen)
 
 
 @lru_cache
 def orbit(name: str, form: str, precision: Precision) -> Orbit:
-    built, lanes = program_of(form, precision)
     chain, formula = chain_of(name), texts(form)[name]
     number, size = list(SPECS).index(name), chain.size
     constants = np.array(formula.constants, precision)
     planes = (STEPS + 1) * (5 * size + 1)
     points = points_of(chain)
-    out = launch(device(), built, f"orbits_f{number}", points, planes, precision, lanes, constants)
+    out = at_points(kernels_of(form, precision), f"orbits_f{number}", points, planes, constants)
     each = out.reshape(STEPS + 1, 5 * size + 1, len(points)).astype(np.float64)
     states = each[:, :-1].reshape(STEPS + 1, size, 5, len(points))
     return Orbit(states[:, :, 0], states[:, :, 1], states[:, :, 2:], each[:, -1])

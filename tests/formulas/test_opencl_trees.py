@@ -19,7 +19,7 @@ from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import parse
 from clfractal.formulas.nodes import Call, Name, Node
 from clfractal.formulas.opencl import write_formula
-from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
 from tests.formulas.orbits import ORBITS, device, usable
 from tests.formulas.rounding import spread
 from tests.formulas.trees import VARIABLES, tame_tree
@@ -91,16 +91,16 @@ def points() -> Floats:
 @lru_cache
 def results(form: str) -> Floats:
     """Values and partials of every tree after one application, shape (trees, 5, points): real, then dual."""
-    lanes = 1
     formulas = [
         write_formula(chain_of(n), dual_map="jacobian" if form == "jacobian" else "operations")
         for n in range(FORMULAS)
     ]
-    built = compile_text(device(), "#define STEPS 1\n" + batch_text(formulas, ORBITS), PRECISION, lanes)
+    text = "#define STEPS 1\n" + batch_text(formulas, ORBITS)
+    kernels = formula_kernels(device(), text, PRECISION, 1)
     found = []
     for number, formula in enumerate(formulas):
         constants = np.array(formula.constants, PRECISION)
-        out = launch(device(), built, f"orbits_f{number}", points(), 2 * 16, PRECISION, lanes, constants)
+        out = at_points(kernels, f"orbits_f{number}", points(), 2 * 16, constants)
         found.append(out.reshape(2, 16, POINTS)[1, :15].reshape(3, 5, POINTS))
     return np.concatenate(found).astype(np.float64)
 

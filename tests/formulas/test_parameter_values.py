@@ -20,9 +20,10 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
-from tests.formulas.opencl_batch import Floats, batch_text, compile_text, launch
+from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
 from tests.formulas.orbits import FAR, ORBITS, STEPS, device, points_of, start_at, usable
 from tests.formulas.rounding import spread
+from tests.small_kernels import SmallKernels
 from tests.variants import one_of
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
@@ -88,11 +89,11 @@ def texts() -> list[FormulaText]:
 
 
 @lru_cache
-def program(precision: Precision) -> tuple[Any, int]:
+def kernels(precision: Precision) -> SmallKernels:
     lanes = accepted_lanes(device(), precision)
     chosen = lanes[min(1, len(lanes) - 1)]
     text = f"#define STEPS {STEPS}\n" + batch_text(texts(), ORBITS)
-    return compile_text(device(), text, precision, chosen), chosen
+    return formula_kernels(device(), text, precision, chosen)
 
 
 def orbits(
@@ -106,14 +107,13 @@ def orbits(
     chain = catalog.load_chain(spec_of(name, parameters))
     formula = write_formula(chain)
     assert formula.text is texts()[number].text
-    built, lanes = program(precision)
     with np.errstate(over="ignore"):
         constants = np.array(formula.constants, precision)
     if as_any and any(link.bound.formula.shaping for link in chain.links):
         assert constants[0] in (0, 1)
         constants[0] = 0
     planes = (STEPS + 1) * (5 * chain.size + 1)
-    out = launch(device(), built, f"orbits_f{number}", at, planes, precision, lanes, constants)
+    out = at_points(kernels(precision), f"orbits_f{number}", at, planes, constants)
     each = out.reshape(STEPS + 1, 5 * chain.size + 1, len(at)).astype(np.float64)
     return each[:, :-1].reshape(STEPS + 1, chain.size, 5, len(at))
 

@@ -7,21 +7,16 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import pyopencl as cl
 import pytest
 
-from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.renderers import records
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import PackedEnvironment, material_fields
 from clfractal.scene.lighting import Environment
-
-Floats = npt.NDArray[np.floating[Any]]
+from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = """\
 #include "lanes.h"
@@ -31,18 +26,8 @@ _TEXT = """\
 #include "shade.h"
 #include "sampling.h"
 #include "environment.h"
-
-INLINE real load(__global const scalar *from) {
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
-    return lanes_load(each);
-}
-INLINE void store(__global scalar *to, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
-}
-
+"""
+_ENVIRONMENT = """\
 // Planes of `count` numbers. In: x, y, z, u, v. Out: red, green, blue, density; the sample's x, y, z, density.
 __kernel void environment(__global const scalar *in, __global scalar *out, __global const float *map,
                           __constant struct Material *material, int count) {
@@ -71,11 +56,16 @@ def settings_of(**values: Any) -> Environment:
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int) -> Any:
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "PALETTE_SIZE": 256}
-    generated = {"environment.cl": _TEXT, "structs.h": struct_text()}
-    flat = flatten("environment.cl", generated=generated, defines=defines)
-    return compiler.compile_source(device, flat.text, program.math_flags(precision))
+def _kernels(device: Device, precision: Precision, lanes: int) -> SmallKernels:
+    text = _TEXT + LOADS + _ENVIRONMENT
+    return SmallKernels(
+        device,
+        text,
+        precision,
+        lanes,
+        generated={"structs.h": struct_text()},
+        defines={"PALETTE_SIZE": 256},
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,26 +90,19 @@ def ask(
 ) -> Answers:
     """Runs the kernel on directions, shape (n, 3), and pairs of numbers in [0, 1), shape (n, 2)."""
     given = len(directions if directions is not None else numbers if numbers is not None else [])
-    count = -(-given // lanes) * lanes
-    planes = np.zeros((5, count), precision)
-    for place, columns in ((slice(0, 3), directions), (slice(3, 5), numbers)):
-        if columns is not None:
-            planes[place, :given] = columns.T
+    kernels = _kernels(choose(), precision, lanes)
+    columns = np.zeros((5, given))
+    for place, numbered in ((slice(0, 3), directions), (slice(3, 5), numbers)):
+        if numbered is not None:
+            columns[place] = numbered.T
+    planes = kernels.planes(columns)
     material = np.zeros((), records.MATERIAL.dtype(precision))
     for name, value in material_fields(settings or settings_of(), packed).items():
         material[name] = value
     material["environment_sun"] = int(has_sun)
-    device = choose()
-    result = np.full((8, count), np.nan, precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    buffers = [
-        cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
-        for array in (planes, result, packed.data, material.reshape(1))
-    ]
-    kernel = cl.Kernel(_program(device, precision, lanes), "environment")
-    kernel.set_args(*buffers, np.int32(count))
-    cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
-    cl.enqueue_copy(device.queue, result, buffers[1])
+    result = np.full((8, planes.shape[1]), np.nan, precision)
+    count = np.int32(planes.shape[1])
+    kernels.run("environment", planes, result, packed.data, material, count, result=result)
     found = result[:, :given]
     return Answers(found[:3].T, found[3], found[4:7].T, found[7])
 

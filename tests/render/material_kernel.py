@@ -4,22 +4,16 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import pyopencl as cl
 
-from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.materials import PBR, material_values, pbr_text, scattering_defines
 from clfractal.renderers.scattering import albedo_tables
 from clfractal.scene.materials import PbrMaterial
-
-Floats = npt.NDArray[np.floating[Any]]
+from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = """\
 #include "lanes.h"
@@ -31,18 +25,6 @@ _TEXT = """\
 #include "bsdf.h"
 #include "bsdf_bumped.h"
 
-"""
-LOADS = """\
-INLINE real load(__global const scalar *from) {
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
-    return lanes_load(each);
-}
-INLINE void store(__global scalar *to, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
-}
 """
 _SCATTER = """\
 #define PUT_COLOR(place, c)               \\
@@ -86,17 +68,15 @@ NORMAL = np.array([0.0, 0.6, 0.8])
 
 
 @cache
-def _program(device: Device, precision: Precision, lanes: int) -> Any:
-    defines = {
-        "LANES": lanes,
-        "REAL_IS_DOUBLE": int(precision == "float64"),
-        "PALETTE_SIZE": 256,
-        **scattering_defines(),
-    }
-    text = _TEXT + LOADS + _SCATTER
-    generated = {"scatter.cl": text, "structs.h": PBR.c_text(), "pbr.h": pbr_text()}
-    flat = flatten("scatter.cl", generated=generated, defines=defines)
-    return compiler.compile_source(device, flat.text, program.math_flags(precision))
+def _kernels(device: Device, precision: Precision, lanes: int) -> SmallKernels:
+    return SmallKernels(
+        device,
+        _TEXT + LOADS + _SCATTER,
+        precision,
+        lanes,
+        generated={"structs.h": PBR.c_text(), "pbr.h": pbr_text()},
+        defines={"PALETTE_SIZE": 256, **scattering_defines()},
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,24 +114,26 @@ def ask(
     weight = material.transmission.weight
     glass = not isinstance(weight, float) or weight > 0
     tables = np.concatenate([albedo_tables(), glass_tables()]) if glass else albedo_tables()
+    kernels = _kernels(choose(), precision, lanes)
     given = max(len(viewer), len(light))
-    count = -(-given // lanes) * lanes
-    planes = np.full((10, count), 0.5, precision)
-    planes[0:3, :given] = viewer.T
-    planes[3:6, :given] = light.T
+    columns = np.full((10, given), 0.5)
+    columns[0:3] = viewer.T
+    columns[3:6] = light.T
     if numbers is not None:
-        planes[6 : 6 + numbers.shape[1], :given] = numbers.T
-    device = choose()
-    result = np.full((11, count), np.nan, precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    record = PBR.array(precision, [material_values(material)])
-    buffers = [
-        cl.Buffer(device.context, flags, hostbuf=np.ascontiguousarray(array).reshape(-1).view(np.uint8))
-        for array in (planes, result, record, tables, np.array(NORMAL if leans is None else leans, precision))
-    ]
-    kernel = cl.Kernel(_program(device, precision, lanes), "scatter")
-    kernel.set_args(*buffers, np.int32(count), np.int32(inside), np.int32(leans is not None))
-    cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
-    cl.enqueue_copy(device.queue, result, buffers[1])
+        columns[6 : 6 + numbers.shape[1]] = numbers.T
+    planes = kernels.planes(columns, 0.5)
+    result = np.full((11, planes.shape[1]), np.nan, precision)
+    kernels.run(
+        "scatter",
+        planes,
+        result,
+        PBR.array(precision, [material_values(material)]),
+        tables,
+        np.array(NORMAL if leans is None else leans, precision),
+        np.int32(planes.shape[1]),
+        np.int32(inside),
+        np.int32(leans is not None),
+        result=result,
+    )
     found = result[:, :given].astype(np.float64)
     return Answers(found[:3].T, found[3], found[4:7].T, found[7], found[8:11].T)

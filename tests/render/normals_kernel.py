@@ -4,35 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyopencl as cl
 
-from clfractal.device import compiler, program
 from clfractal.device.select import Device, choose
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
+from tests.small_kernels import LOADS, Floats, SmallKernels
 
-Floats = npt.NDArray[np.floating[Any]]
 Masks = npt.NDArray[np.bool_]
 
 _TEXT = """\
 #include "lanes.h"
 #include "vectors.h"
 #include "normals.h"
-
-INLINE real load(__global const scalar *from) {
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
-    return lanes_load(each);
-}
-INLINE void store(__global scalar *to, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
-}
+"""
+_NORMALS = """\
 INLINE void store_normal(__global scalar *to, int pixels, vec normal, mask usable) {
     store(to, normal.x);
     store(to + pixels, normal.y);
@@ -108,25 +95,20 @@ def device() -> Device:
 
 
 @cache
-def _program(precision: Precision, lanes: int) -> Any:
-    defines: dict[str, int] = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
-    flat = flatten("normals_test.cl", generated={"normals_test.cl": _TEXT}, defines=defines)
-    return compiler.compile_source(device(), flat.text, program.math_flags(precision))
+def _kernels(precision: Precision, lanes: int) -> SmallKernels:
+    return SmallKernels(device(), _TEXT + LOADS + _NORMALS, precision, lanes)
 
 
 def run(points: Floats, found: Masks, precision: Precision, lanes: int) -> Normals:
     """Normals of pixels with points of shape (n, count, 3), of which those in `found` (n, count) exist."""
     pixels, count = found.shape
-    padded = np.full((count, 4, -(-pixels // lanes) * lanes), np.nan, precision)
-    padded[:, :3, :pixels] = points.transpose(1, 2, 0)
-    padded[:, 3, :pixels] = found.T
+    kernels = _kernels(precision, lanes)
+    columns = np.full((count, 4, pixels), np.nan)
+    columns[:, :3] = points.transpose(1, 2, 0)
+    columns[:, 3] = found.T
+    padded = kernels.planes(columns, np.nan)
     results = np.full((45, padded.shape[2]), np.nan, precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    buffers = [cl.Buffer(device().context, flags, hostbuf=array) for array in (padded, results)]
-    kernel = cl.Kernel(_program(precision, lanes), "normals")
-    kernel.set_args(*buffers, np.int32(padded.shape[2]), np.int32(count))
-    cl.enqueue_nd_range_kernel(device().queue, kernel, (padded.shape[2] // lanes,), (1,))
-    cl.enqueue_copy(device().queue, results, buffers[1])
+    kernels.run("normals", padded, results, np.int32(padded.shape[2]), np.int32(count), result=results)
     each = results[:44, :pixels].astype(np.float64).T.reshape(pixels, 11, 4)
     usable = each[..., 3] == 1
     return Normals(

@@ -7,12 +7,11 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyopencl as cl
 
 from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
-from tests.formulas.opencl_batch import compile_text
+from tests.small_kernels import LOADS, SmallKernels
 
 Array = npt.NDArray[Any]
 
@@ -33,18 +32,8 @@ _TEXT = """\
 #include "vectors.h"
 #include "sampling.h"
 #include "phase.h"
-
-INLINE real load_lanes(__global const scalar *from) {
-    scalar each[LANES];
-    for (int lane = 0; lane < LANES; ++lane) each[lane] = from[lane];
-    return lanes_load(each);
-}
-INLINE void store_lanes(__global scalar *to, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
-}
-
+"""
+_SAMPLES = """\
 __kernel void squares(__global const int *pixels, __global scalar *result, int n, uint seed, uint purpose) {
     const int at = (int)get_global_id(0) * LANES;
     int x[LANES], y[LANES], index[LANES];
@@ -56,18 +45,18 @@ __kernel void squares(__global const int *pixels, __global scalar *result, int n
     const bits seeds = pixel_seed(x, y, seed, purpose);
     real u, v;
     unit_square(bits_load(index), seeds, &u, &v);
-    store_lanes(result + at, u);
-    store_lanes(result + n + at, v);
-    store_lanes(result + 2 * n + at, unit_of_bits(bits_load(index)));
-    store_lanes(result + 3 * n + at, real_of_bits(seeds >> 16));
-    store_lanes(result + 4 * n + at, real_of_bits(seeds & 0xffffu));
+    store(result + at, u);
+    store(result + n + at, v);
+    store(result + 2 * n + at, unit_of_bits(bits_load(index)));
+    store(result + 3 * n + at, real_of_bits(seeds >> 16));
+    store(result + 4 * n + at, real_of_bits(seeds & 0xffffu));
 }
 
 __kernel void shapes(__global const scalar *numbers, __global scalar *result, int n, scalar width) {
     const int at = (int)get_global_id(0) * LANES;
     numbers += at;
-    const real u = load_lanes(numbers), v = load_lanes(numbers + n), spread = load_lanes(numbers + 5 * n);
-    const vec axis = vec_of(load_lanes(numbers + 2 * n), load_lanes(numbers + 3 * n), load_lanes(numbers + 4 * n));
+    const real u = load(numbers), v = load(numbers + n), spread = load(numbers + 5 * n);
+    const vec axis = vec_of(load(numbers + 2 * n), load(numbers + 3 * n), load(numbers + 4 * n));
     real planes[20];
     for (int filter = 0; filter < 3; ++filter)
         filter_offset(u, v, filter, (real)(width), planes + 2 * filter, planes + 2 * filter + 1);
@@ -81,18 +70,18 @@ __kernel void shapes(__global const scalar *numbers, __global scalar *result, in
         planes[9 + 3 * one] = found[one].y;
         planes[10 + 3 * one] = found[one].z;
     }
-    for (int plane = 0; plane < 20; ++plane) store_lanes(result + plane * n + at, planes[plane]);
+    for (int plane = 0; plane < 20; ++plane) store(result + plane * n + at, planes[plane]);
 }
 
 __kernel void turns(__global const scalar *numbers, __global scalar *result, int n) {
     const int at = (int)get_global_id(0) * LANES;
     numbers += at;
-    const real u = load_lanes(numbers), v = load_lanes(numbers + n), g = load_lanes(numbers + 5 * n);
-    const vec before = vec_of(load_lanes(numbers + 2 * n), load_lanes(numbers + 3 * n), load_lanes(numbers + 4 * n));
+    const real u = load(numbers), v = load(numbers + n), g = load(numbers + 5 * n);
+    const vec before = vec_of(load(numbers + 2 * n), load(numbers + 3 * n), load(numbers + 4 * n));
     const vec found = phase_direction(before, u, v, g);
     const real cosine = phase_cosine(u, g);
     const real planes[5] = {cosine, phase_of(cosine, g), found.x, found.y, found.z};
-    for (int plane = 0; plane < 5; ++plane) store_lanes(result + plane * n + at, planes[plane]);
+    for (int plane = 0; plane < 5; ++plane) store(result + plane * n + at, planes[plane]);
 }
 """
 
@@ -108,8 +97,8 @@ __kernel void points(__global const int *pixels, __global scalar *result, int n,
     for (int point = 0; point < count; ++point) {
         real across, below;
         point_offset(point, count, rows, seeds, &across, &below);
-        store_lanes(result + 2 * point * n + at, across);
-        store_lanes(result + (2 * point + 1) * n + at, below);
+        store(result + 2 * point * n + at, across);
+        store(result + (2 * point + 1) * n + at, below);
     }
 }
 """
@@ -119,8 +108,8 @@ class Sampler:
     """The program for one precision and lane count."""
 
     def __init__(self, device: Device, precision: Precision, lanes: int) -> None:
-        self.device, self.precision, self.lanes = device, precision, lanes
-        self.program = compile_text(device, _TEXT + _POINTS, precision, lanes)
+        self.precision, self.lanes = precision, lanes
+        self._kernels = SmallKernels(device, _TEXT + LOADS + _SAMPLES + _POINTS, precision, lanes)
 
     def squares(
         self, x: Array, y: Array, index: Array, seed: int = 0, purpose: int = 0
@@ -155,15 +144,7 @@ class Sampler:
         n = given.shape[1]
         assert n % self.lanes == 0
         result = np.full((planes, n), np.nan, self.precision)
-        flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        buffers = [
-            cl.Buffer(self.device.context, flags, hostbuf=np.ascontiguousarray(array))
-            for array in (given, result)
-        ]
-        kernel = cl.Kernel(self.program, name)
-        kernel.set_args(*buffers, np.int32(n), *settings)
-        cl.enqueue_nd_range_kernel(self.device.queue, kernel, (n // self.lanes,), (1,))
-        cl.enqueue_copy(self.device.queue, result, buffers[1])
+        self._kernels.run(name, given, result, np.int32(n), *settings, result=result)
         return result.astype(np.float64)
 
 

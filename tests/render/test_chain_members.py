@@ -13,10 +13,11 @@ from clfractal.device.select import Device, choose, has_float64
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
-from tests.formulas.opencl_batch import batch_text, compile_text, kernel_file, launch
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.planes import plane_scene
 from tests.render.point_checks import agree, orbit_bytes
 from tests.render.shots import shoot
+from tests.small_kernels import SmallKernels
 from tests.voxels.grids import filled, volume_scene
 
 Floats = npt.NDArray[np.float64]
@@ -48,9 +49,9 @@ def device() -> Device:
 
 
 @lru_cache
-def program() -> Any:
+def program() -> SmallKernels:
     tail = "".join(map(kernel_file, ("orbit.h", "solids.h", "points.cl")))
-    return compile_text(
+    return formula_kernels(
         device(), batch_text([write_formula(chain_of(n)) for n in CHAINS], tail), "float64", 1
     )
 
@@ -62,8 +63,7 @@ def launched(kernel: str, name: str, chain: Chain, at: Floats, planes: int) -> F
     constants = np.array(formula.constants, "float64")
     number = list(CHAINS).index(name)
     kind = "int32" if kernel == "escape_counts" else "float64"
-    name_of = f"{kernel}_f{number}"
-    out = launch(device(), program(), name_of, at, planes, "float64", 1, orbit, constants, kind=kind)
+    out = at_points(program(), f"{kernel}_f{number}", at, planes, orbit, constants, kind=kind)
     return out.astype(np.float64)
 
 

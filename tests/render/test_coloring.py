@@ -18,30 +18,22 @@ from clfractal.renderers import records
 from clfractal.renderers.kinds import TRAPS, kind_text
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
-from tests.formulas.opencl_batch import HEAD, compile_text, kernel_file, launch, planes_of
+from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
 from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of
 from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
+from tests.small_kernels import LOADS, SmallKernels
 from tests.variants import one_of
 
 LIMIT = 3.0  # the diameter of the ball's bounds
 STEP = LIMIT / 200
 TOLERANCE = {"float32": 4e-6, "float64": 1e-4 * STEP}
 
-LOAD = """
-INLINE vec load_vec(__global const scalar *planes, int stride, int first) {
-    scalar x[LANES], y[LANES], z[LANES];
-    for (int lane = 0; lane < LANES; ++lane) {
-        x[lane] = planes[first + lane];
-        y[lane] = planes[stride + first + lane];
-        z[lane] = planes[2 * stride + first + lane];
-    }
-    return vec_of(lanes_load(x), lanes_load(y), lanes_load(z));
-}
-INLINE void store_plane(__global scalar *result, int first, real value) {
-    scalar each[LANES];
-    lanes_store(value, each);
-    for (int lane = 0; lane < LANES; ++lane) result[first + lane] = each[lane];
-}
+LOAD = f"""
+{LOADS}
+INLINE vec load_vec(__global const scalar *planes, int stride, int first) {{
+    planes += first;
+    return vec_of(load(planes), load(planes + stride), load(planes + 2 * stride));
+}}
 """
 
 QUANTITIES = """
@@ -55,7 +47,7 @@ __kernel void quantities(__global const scalar *points, __global scalar *result,
     const vec normal = load_vec(normals, stride, first), view = load_vec(views, stride, first);
     const mask active = less(R(0.0), vec_dot(normal, normal));
     const real found = coloring_quantity(point, normal, view, R(0.002), R(7.25), R(0.5), active, material, orbit, k);
-    store_plane(result, first, found);
+    store(result + first, found);
 }
 """
 
@@ -68,7 +60,7 @@ __kernel void traps(__global const scalar *points, __global scalar *result, int 
     for (int shape = 0; shape < 4; ++shape) {
         const trap near = {shape, vec_splat(material->trap_center), vec_splat(material->trap_direction),
                            (real)(material->trap_radius)};
-        store_plane(result, shape * stride + first, orbit_near(near, point, equal(R(0.0), R(0.0)), orbit, k));
+        store(result + shape * stride + first, orbit_near(near, point, equal(R(0.0), R(0.0)), orbit, k));
     }
 }
 """
@@ -79,9 +71,9 @@ __kernel void colors(__global const scalar *points, __global scalar *result, int
     const int first = (int)get_global_id(0) * LANES;
     const color found = palette_color(palette_place(load_vec(points, stride, first).x, material),
                                       material->palette_repeat, palette);
-    store_plane(result, first, found.r);
-    store_plane(result, stride + first, found.g);
-    store_plane(result, 2 * stride + first, found.b);
+    store(result + first, found.r);
+    store(result + stride + first, found.g);
+    store(result + 2 * stride + first, found.b);
 }
 """
 
@@ -97,11 +89,11 @@ def usable(precision: Precision) -> Precision:
 
 
 @lru_cache
-def compiled(text: str, precision: Precision, lanes: int) -> Any:
-    return compile_text(device(), text, precision, lanes)
+def compiled(text: str, precision: Precision, lanes: int) -> SmallKernels:
+    return formula_kernels(device(), text, precision, lanes)
 
 
-def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> Any:
+def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> SmallKernels:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
     head = kind_text() + "#define PALETTE_SIZE 256\n"
     headers = "".join(kernel_file(name) for name in ("orbit.h", "solids.h", "coloring.h", "shade.h"))
@@ -128,9 +120,9 @@ def quantity(
     """The scene's quantity at points, with a footprint of 0.002, a smooth count of 7.25 and a residual of 0.5."""
     lanes = lanes or best_lanes(device(), precision)
     built = build(scene, QUANTITIES, precision, lanes)
-    ways = [planes_of(each, precision, lanes) for each in (normals, views)]
+    ways = [built.planes(each.T) for each in (normals, views)]
     arguments = [*ways, *uploaded(scene, precision)]
-    planes = launch(device(), built, "quantities", points, 1, precision, lanes, *arguments)
+    planes = at_points(built, "quantities", points, 1, *arguments)
     return np.asarray(planes[0], float)
 
 
@@ -254,16 +246,8 @@ def test_traps_against_numpy(name: str) -> None:
     scene = trap_scene(name)
     lanes = best_lanes(device(), precision)
     points = np.random.default_rng(3).uniform(-0.9, 0.9, (64, 3))
-    found = launch(
-        device(),
-        build(scene, TRAP_KERNEL, precision, lanes),
-        "traps",
-        points,
-        4,
-        precision,
-        lanes,
-        *uploaded(scene, precision),
-    )
+    built = build(scene, TRAP_KERNEL, precision, lanes)
+    found = at_points(built, "traps", points, 4, *uploaded(scene, precision))
     expected = trap_by_numpy(scene, points)
     assert np.isfinite(expected).all()
     tolerance = 1e-10 if precision == "float64" else 1e-3
@@ -275,7 +259,7 @@ def test_an_orbit_that_starts_outside_has_its_start() -> None:
     lanes = best_lanes(device(), "float32")
     built = build(scene, TRAP_KERNEL, "float32", lanes)
     point = np.array([[0.0, 7.0, 0.0]])
-    found = launch(device(), built, "traps", point, 4, "float32", lanes, *uploaded(scene, "float32"))
+    found = at_points(built, "traps", point, 4, *uploaded(scene, "float32"))
     np.testing.assert_allclose(found[:, 0], trap_distances(point[0]), rtol=1e-6)
 
 
@@ -284,17 +268,8 @@ def colors(scene: Scene, table: Floats, quantities: Floats) -> Floats:
     lanes = best_lanes(device(), "float32")
     built = build(scene, COLORS, "float32", lanes)
     points = np.stack([quantities, quantities, quantities], axis=1)
-    return launch(
-        device(),
-        built,
-        "colors",
-        points,
-        3,
-        "float32",
-        lanes,
-        uploaded(scene, "float32")[0],
-        table.astype(np.float32),
-    ).T.astype(float)
+    material = uploaded(scene, "float32")[0]
+    return at_points(built, "colors", points, 3, material, table.astype(np.float32)).T.astype(float)
 
 
 RAMP = np.stack([np.arange(256) / 255, 1 - np.arange(256) / 255, np.full(256, 0.25)], axis=1)

@@ -7,21 +7,18 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import pyopencl as cl
 import pytest
 from scipy.stats import qmc
 
-from clfractal.device import compiler, program
 from clfractal.device.select import choose
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.objects import object_defines, object_records
 from clfractal.renderers.planes import CUT_PLANE
 from clfractal.scene.model import Scene
-from tests.render.material_kernel import LOADS
 from tests.render.objects_oracle import NOWHERE, met
 from tests.render.shots import PERSPECTIVE, Floats, scene_of
+from tests.small_kernels import LOADS, SmallKernels
 from tests.variants import one_of
 
 _TEXT = f"""\
@@ -95,24 +92,18 @@ def axes(shape: str) -> Floats:
 
 def look(shape: str, point: Floats, precision: Precision, lanes: int, count: int = 1 << 13) -> Floats:
     """Ways, shape (n, 3), densities, those of meeting them, and weights: rows of 6 numbers."""
-    device, lit = choose(), scene(shape)
-    defines = {
-        "LANES": lanes,
-        "REAL_IS_DOUBLE": int(precision == "float64"),
-        "PALETTE_SIZE": 256,
-        **object_defines(lit),
-    }
-    generated = {"look.cl": _TEXT, "structs.h": struct_text() + CUT_PLANE.c_text()}
-    flat = flatten("look.cl", generated=generated, defines=defines)
-    kernel = cl.Kernel(compiler.compile_source(device, flat.text, program.math_flags(precision)), "look")
-    given = np.clip(qmc.Sobol(3, seed=3).random(count), 1e-6, 1 - 1e-6).T
-    out = np.empty((6, count), precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    arrays = (np.ascontiguousarray(given, precision), out, object_records(lit, precision))
-    buffers = [cl.Buffer(device.context, flags, hostbuf=array) for array in arrays]
-    kernel.set_args(*buffers, *(np.dtype(precision).type(part) for part in point), np.int32(count))
-    cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
-    cl.enqueue_copy(device.queue, out, buffers[1])
+    lit = scene(shape)
+    kernels = SmallKernels(
+        choose(),
+        _TEXT,
+        precision,
+        lanes,
+        generated={"structs.h": struct_text() + CUT_PLANE.c_text()},
+        defines={"PALETTE_SIZE": 256, **object_defines(lit)},
+    )
+    given = kernels.planes(np.clip(qmc.Sobol(3, seed=3).random(count), 1e-6, 1 - 1e-6).T)
+    out, records = np.full((6, count), np.nan, precision), object_records(lit, precision)
+    kernels.run("look", given, out, records, *kernels.scalars(point), np.int32(count), result=out)
     return out.T.astype(float)
 
 

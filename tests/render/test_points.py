@@ -18,8 +18,9 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import points
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
-from tests.formulas.opencl_batch import batch_text, compile_text, kernel_file, launch
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.point_checks import Floats, agree, orbit_bytes
+from tests.small_kernels import SmallKernels
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
@@ -61,8 +62,8 @@ def count_texts() -> tuple[dict[str, int], str]:
 
 
 @lru_cache
-def count_program(precision: Precision, lanes: int) -> Any:
-    return compile_text(device(), count_texts()[1], precision, lanes)
+def count_program(precision: Precision, lanes: int) -> SmallKernels:
+    return formula_kernels(device(), count_texts()[1], precision, lanes)
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
@@ -78,9 +79,7 @@ def test_every_count_of_the_tables_at_every_lane_count(case: str, precision: Pre
     for lanes in tried:
         kernel = f"escape_counts_f{count_texts()[0][case]}"
         built = count_program(precision, lanes)
-        out = launch(
-            device(), built, kernel, rows[:, :3], 2, precision, lanes, orbit, constants, kind="int32"
-        )
+        out = at_points(built, kernel, rows[:, :3], 2, orbit, constants, kind="int32")
         np.testing.assert_array_equal(out[0], rows[:, 3], f"counts, {lanes} lanes")
         np.testing.assert_array_equal(out[1] == 1, rows[:, 4] == 1, f"inside, {lanes} lanes")
 
@@ -150,9 +149,9 @@ ITERATIONS = 10
 
 
 @lru_cache
-def distance_program() -> Any:
+def distance_program() -> SmallKernels:
     formulas = [write_formula(catalog.load_chain(name)) for name in NAMES]
-    return compile_text(device(), batch_text(formulas, only("distances")), "float64", 1)
+    return formula_kernels(device(), batch_text(formulas, only("distances")), "float64", 1)
 
 
 def points_of(chain: Chain) -> Floats:
@@ -169,7 +168,7 @@ def test_distances_and_normals(name: str) -> None:
     orbit = orbit_bytes(chain, ITERATIONS, "float64", None)
     kernel = f"distances_f{NAMES.index(name)}"
     constants = np.array(formula.constants, "float64")
-    step, full, *rest = launch(device(), distance_program(), kernel, here, 7, "float64", 1, orbit, constants)
+    step, full, *rest = at_points(distance_program(), kernel, here, 7, orbit, constants)
     normal, inside = np.array(rest[:3]).T, rest[4] == 1
     expected, gradient = reference.distance(chain, here, ITERATIONS)
     agree(full, normal, expected, gradient)

@@ -6,19 +6,13 @@ import math
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import pyopencl as cl
 import pytest
 from scipy.stats import chi2, qmc
 
-from clfractal.device import compiler, program
 from clfractal.device.select import choose
-from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
 from clfractal.renderers.records import LIGHT
-from tests.render.material_kernel import LOADS
-
-Floats = npt.NDArray[np.floating[Any]]
+from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = f"""\
 #include "lanes.h"
@@ -49,24 +43,18 @@ SIDE, UPWARD = 1.5 * np.array([0.8, 0.6, 0]), 0.5 * np.array([-0.6, 0.8, 0])
 
 def look(point: Floats, numbers: Floats, precision: Precision, lanes: int) -> tuple[Floats, Floats]:
     """Directions, shape (n, 3), and densities."""
-    device = choose()
-    defines = {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), "PALETTE_SIZE": 256}
-    flat = flatten("look.cl", generated={"look.cl": _TEXT, "structs.h": LIGHT.c_text()}, defines=defines)
-    kernel = cl.Kernel(compiler.compile_source(device, flat.text, program.math_flags(precision)), "look")
+    structs = {"structs.h": LIGHT.c_text()}
+    kernels = SmallKernels(
+        choose(), _TEXT, precision, lanes, generated=structs, defines={"PALETTE_SIZE": 256}
+    )
     values: dict[str, Any] = {
         field.name: (0.0,) * field.count if field.count else 0 for field in LIGHT.fields
     }
     values |= {"vector": MIDDLE, "axis": (0, 0, -1), "side": SIDE, "upward": UPWARD, "area": 3.0}
     count = len(numbers)
-    out = np.empty((4, count), precision)
-    flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-    given = np.ascontiguousarray(numbers.T, precision)
-    buffers = [
-        cl.Buffer(device.context, flags, hostbuf=a) for a in (given, out, LIGHT.array(precision, [values]))
-    ]
-    kernel.set_args(*buffers, *(np.dtype(precision).type(part) for part in point), np.int32(count))
-    cl.enqueue_nd_range_kernel(device.queue, kernel, (count // lanes,), (1,))
-    cl.enqueue_copy(device.queue, out, buffers[1])
+    given, out = kernels.planes(numbers.T), np.full((4, count), np.nan, precision)
+    light = LIGHT.array(precision, [values])
+    kernels.run("look", given, out, light, *kernels.scalars(point), np.int32(count), result=out)
     return out[:3].T.astype(float), out[3].astype(float)
 
 
