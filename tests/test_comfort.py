@@ -27,7 +27,8 @@ from clfractal.work.comfort import (
 from clfractal.work.job import Job
 from clfractal.work.look import Look, points_of_depth
 from clfractal.work.run import run
-from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, scene_of, shoot
+from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, shoot
+from tests.scenes import scene_of
 from tests.shell import SCENE
 
 CAMERA: dict[str, Any] = {"position": [0.0, -3.0, 0.0], "fov": 50.0}

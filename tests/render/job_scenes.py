@@ -13,8 +13,9 @@ from clfractal.files.exr import write_exr
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.layouts import VIEWS
-from tests.render.shots import BALL, BALL_ITERATIONS, PERSPECTIVE
+from tests.render.shots import BALL, PERSPECTIVE
 from tests.render.volumes import keep, middles
+from tests.scenes import BALL_ITERATIONS
 
 SIZE = (48, 40)
 

@@ -6,7 +6,8 @@ from typing import Any
 
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from tests.render.shots import BALL, BALL_ITERATIONS
+from tests.render.shots import BALL
+from tests.scenes import BALL_ITERATIONS
 
 # A surface, a cut plane and a volume, as the thesis's figure 9 has them.
 VIEWS: list[dict[str, Any]] = [

@@ -25,10 +25,10 @@ from tests.render.shots import (
     SPHERE_RADIUS,
     Floats,
     rays,
-    scene_of,
     shoot,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 Bools = npt.NDArray[np.bool_]
 

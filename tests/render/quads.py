@@ -11,7 +11,8 @@ from clfractal.formulas import reference
 from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import named_table
-from tests.render.shots import BALL_ITERATIONS, Floats, rays
+from tests.render.shots import Floats, rays
+from tests.scenes import BALL_ITERATIONS
 
 COLORS = {"mode": "stepped", "palette": "magma", "inside": [0.9, 0.1, 0.3], "scale": 1.5}
 

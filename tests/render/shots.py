@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -16,13 +16,13 @@ from clfractal.pictures.tiled import TiledStore
 from clfractal.pictures.tiles import TILE, Tile
 from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.plan import Plan, PlannedView, make_plan
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.work.engine import Engine
 from clfractal.work.job import Identity, Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import Progress, WorkItem, run
+from tests.scenes import BALL_ITERATIONS
 
 Floats = npt.NDArray[np.float64]
 
@@ -43,9 +43,6 @@ CHANNELS = (
     "samples",
 )
 
-# Squaring the quaternion x + iy + jz squares its length, so after n applications |z| <= 4 is the ball of radius
-# 4^(2^-n) exactly.
-BALL_ITERATIONS = 8
 BALL_RADIUS = 4.0 ** (2.0**-BALL_ITERATIONS)
 BALL: dict[str, Any] = {
     "variables": ["x", "y", "z"],
@@ -73,21 +70,6 @@ SOLIDS: dict[str, Any] = {
 
 PERSPECTIVE = {"position": [1.5, -2.5, 1.2], "target": [0.1, 0.05, 0], "up": [0.1, 0, 1], "fov": 48}
 ORTHOGRAPHIC = {"projection": "orthographic", "position": [1, -2, 1.5], "target": [0, 0.1, 0], "height": 2.6}
-
-
-def scene_of(
-    formula: Mapping[str, Any],
-    camera: Mapping[str, Any],
-    size: tuple[int, int] = (64, 64),
-    **sections: Any,
-) -> Scene:
-    """A scene of a whole `formula` section, or of an inline formula (with enough iterations for a ball)."""
-    if "map" in formula:
-        formula = {"inline": dict(formula), "iterations": BALL_ITERATIONS}
-    image = {"width": size[0], "height": size[1]}
-    return load_scene(
-        {"version": 1, "formula": dict(formula), "image": image, "camera": dict(camera), **sections}
-    )
 
 
 def plan_of(scene: Scene, device: Device, precision: Precision = "float32", **settings: Any) -> Plan:

@@ -15,8 +15,9 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import BALL_ITERATIONS, Floats, rays, shoot, stacked
+from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import keep, middles, own_rays, to_box, value_at
+from tests.scenes import BALL_ITERATIONS
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

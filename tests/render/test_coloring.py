@@ -19,8 +19,9 @@ from clfractal.renderers.kinds import TRAPS, kind_text
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
 from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
-from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS, PERSPECTIVE, SOLIDS, scene_of
+from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
 from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
+from tests.scenes import BALL_ITERATIONS, scene_of
 from tests.small_kernels import LOADS, SmallKernels
 from tests.variants import one_of
 

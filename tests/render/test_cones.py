@@ -23,9 +23,9 @@ from tests.render.shots import (
     plan_of,
     rays,
     render_planned,
-    scene_of,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 SIZE = (320, 240)
 LIGHTS: list[dict[str, Any]] = [{"direction": [-1, 1, -1]}]

@@ -17,7 +17,8 @@ from clfractal.renderers.objects import object_defines, object_records
 from clfractal.renderers.planes import CUT_PLANE
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE, met
-from tests.render.shots import PERSPECTIVE, Floats, scene_of
+from tests.render.shots import PERSPECTIVE, Floats
+from tests.scenes import scene_of
 from tests.small_kernels import LOADS, SmallKernels
 from tests.variants import one_of
 

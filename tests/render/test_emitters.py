@@ -11,7 +11,8 @@ from clfractal.device.select import Device
 from clfractal.renderers.emitters import asked_radiance
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE, rotation_of
-from tests.render.shots import Floats, points_of, scene_of, shoot, stacked
+from tests.render.shots import Floats, points_of, shoot, stacked
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

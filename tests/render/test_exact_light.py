@@ -11,7 +11,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import colors, normals_of, scene_of, shoot
+from tests.render.shots import colors, normals_of, shoot
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}

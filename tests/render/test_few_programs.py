@@ -14,7 +14,8 @@ from clfractal.renderers.surface import PROGRAMS, program_texts
 from clfractal.scene.model import Scene
 from tests.makers import maker
 from tests.platforms.programs import every_text
-from tests.render.shots import PERSPECTIVE, plan_of, scene_of, shoot_whole
+from tests.render.shots import PERSPECTIVE, plan_of, shoot_whole
+from tests.scenes import scene_of
 
 FORMULA = {"name": "mandelbulb", "iterations": 6}
 PLANE = {"center": [0, 0, 0], "normal": [1, -1, 0.2], "width": 2, "height": 2}

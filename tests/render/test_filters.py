@@ -10,7 +10,8 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
-from tests.render.shots import SOLIDS, Floats, scene_of, shoot
+from tests.render.shots import SOLIDS, Floats, shoot
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIDE, DETAIL = 48, 0.01

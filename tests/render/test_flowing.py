@@ -11,7 +11,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.joined_oracle import Floats, a_sphere, marched, smooth, solids
-from tests.render.shots import BALL, PERSPECTIVE, SOLIDS, points_of, rays, scene_of, shoot
+from tests.render.shots import BALL, PERSPECTIVE, SOLIDS, points_of, rays, shoot
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 PLACE, RADIUS, WIDTH = [0.9, -0.7, 0.4], 0.35, 0.4

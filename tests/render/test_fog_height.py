@@ -9,17 +9,8 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
-from tests.render.shots import (
-    BALL_RADIUS,
-    PERSPECTIVE,
-    QUICK_BALL,
-    Floats,
-    rays,
-    scene_of,
-    shoot,
-    stacked,
-    to_sphere,
-)
+from tests.render.shots import BALL_RADIUS, PERSPECTIVE, QUICK_BALL, Floats, rays, shoot, stacked, to_sphere
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIDE = 48

@@ -9,7 +9,8 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
-from tests.render.shots import ORTHOGRAPHIC, PERSPECTIVE, Floats, rays, scene_of, shoot, stacked, to_sphere
+from tests.render.shots import ORTHOGRAPHIC, PERSPECTIVE, Floats, rays, shoot, stacked, to_sphere
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIDE, RADIUS = 32, 0.8

@@ -16,7 +16,8 @@ from clfractal.formulas.language import Chain
 from clfractal.pictures.film import Film
 from clfractal.renderers.lanes import best_lanes
 from clfractal.renderers.points import escape
-from tests.render.shots import Floats, points_of, scene_of, shoot
+from tests.render.shots import Floats, points_of, shoot
+from tests.scenes import scene_of
 
 ITERATIONS = 250
 FORMULA = {"name": "hast", "parameters": {"power": 2}, "iterations": ITERATIONS}

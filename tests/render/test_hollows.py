@@ -20,7 +20,8 @@ from tests.render.joined_oracle import (
     marched,
     normal_at,
 )
-from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, normals_of, points_of, rays, scene_of, shoot
+from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, normals_of, points_of, rays, shoot
+from tests.scenes import scene_of
 from tests.voxels.joined import belongs
 
 # The scene's own formula is a large ball; balls are cut out of it, and one floats in the hollow.

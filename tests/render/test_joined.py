@@ -34,10 +34,10 @@ from tests.render.shots import (
     plan_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     shoot_whole,
 )
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 WAYS: dict[str, dict[str, Any]] = {"distance": {}, "steps": {"search": "steps", "step": 0.01}}

@@ -18,11 +18,11 @@ from tests.render.shots import (
     QUICK_BALL,
     Floats,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIDE, SAMPLES = 64, 256

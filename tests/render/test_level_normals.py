@@ -14,7 +14,8 @@ from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, turned_axes
 from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, degrees, sizes, slopes
-from tests.render.shots import normals_of, points_of, scene_of, shoot
+from tests.render.shots import normals_of, points_of, shoot
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 FINE: dict[str, Any] = {"type": "surface", "detail": 0.02}

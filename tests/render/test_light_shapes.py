@@ -9,7 +9,8 @@ import pytest
 
 from clfractal.device.select import Device
 from tests.render.known_lights import BRIGHT, CASES, SPOT, ground
-from tests.render.shots import ORTHOGRAPHIC, SOLIDS, colors, points_of, scene_of, shoot
+from tests.render.shots import ORTHOGRAPHIC, SOLIDS, colors, points_of, shoot
+from tests.scenes import scene_of
 
 
 @pytest.mark.parametrize(("light", "expected"), CASES, ids=["sphere", "rectangle", "spot"])

@@ -16,17 +16,9 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import (
-    BALL_ITERATIONS,
-    PERSPECTIVE,
-    Floats,
-    normals_of,
-    points_of,
-    rays,
-    shoot,
-    to_sphere,
-)
+from tests.render.shots import PERSPECTIVE, Floats, normals_of, points_of, rays, shoot, to_sphere
 from tests.render.volumes import keep, middles, own_rays, to_box, value_at
+from tests.scenes import BALL_ITERATIONS
 
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1], "scale": [1, 1.3, 0.8]}
 ROUGH = np.random.default_rng(3).uniform(0, 1, (9, 13, 20)).astype(np.float32)

@@ -21,11 +21,11 @@ from tests.render.shots import (
     plan_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     view_of,
 )
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}

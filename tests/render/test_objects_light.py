@@ -10,7 +10,8 @@ import pytest
 from clfractal.device.select import Device
 from tests.render.known_lights import CASES
 from tests.render.objects_oracle import NOWHERE, met
-from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, colors, points_of, rays, scene_of, shoot
+from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, colors, points_of, rays, shoot
+from tests.scenes import scene_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
 FLOOR = {"type": "plane", "position": [0, 0, -0.5], "material": "white"}

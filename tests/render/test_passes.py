@@ -17,7 +17,8 @@ from clfractal.renderers.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import run
-from tests.render.shots import BALL, CHANNELS, PERSPECTIVE, job_of, plan_of, scene_of, shoot, stacked
+from tests.render.shots import BALL, CHANNELS, PERSPECTIVE, job_of, plan_of, shoot, stacked
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIZE = (72, 48)

@@ -39,11 +39,11 @@ from tests.render.shots import (
     normals_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 # Search, normal and pattern: each is a program of its own.
 VARIANTS: list[Variant] = [

@@ -19,15 +19,8 @@ from clfractal.renderers.plan import (
     make_region,
 )
 from clfractal.scene.model import Scene
-from tests.render.shots import (
-    BALL,
-    BALL_RADIUS,
-    ORTHOGRAPHIC,
-    PERSPECTIVE,
-    scene_of,
-    shoot,
-    view_of,
-)
+from tests.render.shots import BALL, BALL_RADIUS, ORTHOGRAPHIC, PERSPECTIVE, shoot, view_of
+from tests.scenes import scene_of
 
 DIRECTION = np.array([0.48, -0.6, 0.64])  # length 1
 

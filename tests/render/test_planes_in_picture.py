@@ -22,7 +22,6 @@ from tests.render.planes import mandelbrot, sure
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
 from tests.render.shots import (
     BALL,
-    BALL_ITERATIONS,
     BALL_RADIUS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -39,6 +38,7 @@ from tests.render.shots import (
     view_of,
 )
 from tests.render.volumes import keep, middles
+from tests.scenes import BALL_ITERATIONS
 
 POSITION = [1.5, -2.5, 1.2]
 CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}

@@ -28,11 +28,11 @@ from tests.render.shots import (
     QUICK_BALL,
     Floats,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 SIDE, DETAIL = 48, 0.01
 RIM = 0.1  # of DETAIL: how much wider the ball looks

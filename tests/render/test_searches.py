@@ -34,11 +34,11 @@ from tests.render.shots import (
     normals_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 Bools = npt.NDArray[np.bool_]
 

@@ -15,8 +15,9 @@ from clfractal.renderers.set_lights import BALL_NUMBERS, SetLights, packed, prob
 from clfractal.scene import places
 from clfractal.scene.coloring import Trap
 from clfractal.scene.model import Scene
-from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, scene_of, shoot, stacked
+from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, shoot, stacked
 from tests.render.traps import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

@@ -24,7 +24,8 @@ from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 from clfractal.work.job import Job
-from tests.render.shots import BALL, BALL_ITERATIONS, BALL_RADIUS
+from tests.render.shots import BALL, BALL_RADIUS
+from tests.scenes import BALL_ITERATIONS
 from tests.variants import combinations, one_of
 
 Floats = npt.NDArray[np.float64]

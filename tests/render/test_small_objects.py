@@ -12,16 +12,8 @@ from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import (
-    BALL,
-    BALL_ITERATIONS,
-    BALL_RADIUS,
-    QUICK_BALL,
-    colors,
-    points_of,
-    scene_of,
-    shoot,
-)
+from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, colors, points_of, shoot
+from tests.scenes import BALL_ITERATIONS, scene_of
 from tests.variants import combinations, one_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}

@@ -20,16 +20,8 @@ from clfractal.voxels import fill as voxels
 from clfractal.work.engine import Engine
 from clfractal.work.job import StereoPair
 from clfractal.work.prepare import prepare
-from tests.render.shots import (
-    BALL,
-    BALL_RADIUS,
-    CHANNELS,
-    engine_of,
-    points_of,
-    scene_of,
-    shoot,
-    stacked,
-)
+from tests.render.shots import BALL, BALL_RADIUS, CHANNELS, engine_of, points_of, shoot, stacked
+from tests.scenes import scene_of
 
 SIZE = (64, 48)
 SIDES: tuple[EyeName, EyeName] = ("left", "right")

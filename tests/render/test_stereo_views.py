@@ -20,8 +20,9 @@ from clfractal.optics.stereo import NEAREST, attitude, degrees, frustum, paralla
 from clfractal.optics.view import View, camera_view, eye_view, middle_view
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, EyeName, Stereo
-from tests.render.shots import BALL, ORTHOGRAPHIC, scene_of
+from tests.render.shots import BALL, ORTHOGRAPHIC
 from tests.render.stereo_geometry import CAMERA, SIDES, Floats, dot, unit
+from tests.scenes import scene_of
 
 Views = dict[EyeName, View]
 coordinate = st.floats(-8, 8)

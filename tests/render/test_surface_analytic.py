@@ -22,12 +22,12 @@ from tests.render.shots import (
     normals_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
     view_of,
 )
+from tests.scenes import scene_of
 
 CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 # In float32 coordinates near 1 and depths near 3 come in steps of 1e-7 and 2e-7; some operations add up.

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from tests.render.shots import Floats, normals_of, points_of, scene_of, shoot
+from tests.render.shots import Floats, normals_of, points_of, shoot
+from tests.scenes import scene_of
 
 Map = Callable[[Floats, Floats], Floats]
 

@@ -24,11 +24,11 @@ from tests.render.shots import (
     Floats,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 MATERIAL: dict[str, Any] = {
     "color": [0.9, 0.5, 0.2],

@@ -38,10 +38,10 @@ from tests.render.shots import (
     points_of,
     rays,
     render_planned,
-    scene_of,
     shoot,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 
 def solids(light: dict[str, Any] | list[dict[str, Any]], material: dict[str, Any], **occlusion: Any) -> Scene:

@@ -20,11 +20,11 @@ from tests.render.shots import (
     normals_of,
     points_of,
     rays,
-    scene_of,
     shoot,
     stacked,
     to_sphere,
 )
+from tests.scenes import scene_of
 
 GRADIENT = {"top": [0.1, 0.4, 2.0], "bottom": [0.5, 0.0, 1.0]}
 # Ambient light alone: every sample of the ball has this colour.

@@ -26,10 +26,10 @@ from tests.render.shots import (
     plan_of,
     render_planned,
     render_tile,
-    scene_of,
     shoot,
     stacked,
 )
+from tests.scenes import scene_of
 
 SIZE = (100, 75)  # no multiple of a tile's side, in neither direction
 LIGHTS: list[dict[str, Any]] = [

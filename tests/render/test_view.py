@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from tests.render.shots import BALL, BALL_RADIUS, points_of, rays, scene_of, shoot, view_of
+from tests.render.shots import BALL, BALL_RADIUS, points_of, rays, shoot, view_of
+from tests.scenes import scene_of
 
 CAMERAS: dict[str, dict[str, Any]] = {
     "perspective": {"position": [1.5, -2.5, 1.2], "target": [0.1, 0.05, 0], "up": [0.1, 0, 1], "fov": 48},

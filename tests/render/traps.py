@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from clfractal.formulas import reference
 from clfractal.scene.model import Scene
-from tests.render.shots import PERSPECTIVE, scene_of
+from tests.render.shots import PERSPECTIVE
+from tests.scenes import scene_of
 
 Floats = npt.NDArray[np.float64]
 

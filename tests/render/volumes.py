@@ -13,7 +13,8 @@ from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from tests.render.shots import BALL, BALL_ITERATIONS, Floats, rays
+from tests.render.shots import BALL, Floats, rays
+from tests.scenes import BALL_ITERATIONS
 
 # Light that shows a place's own colour, whatever its normal.
 FLAT: dict[str, Any] = {

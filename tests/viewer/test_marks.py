@@ -9,7 +9,8 @@ import pytest
 
 from clfractal.optics.view import scene_view
 from clfractal.viewer import handles, marks
-from tests.render.shots import BALL, PERSPECTIVE, scene_of
+from tests.render.shots import BALL, PERSPECTIVE
+from tests.scenes import scene_of
 from tests.viewer.panel_harness import headless
 
 SIZE = (64, 64)

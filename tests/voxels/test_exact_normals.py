@@ -12,7 +12,8 @@ from clfractal.renderers.planes import zoom_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, turned_axes
 from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, along, degrees, onto_level, sizes, slopes
-from tests.render.shots import normals_of, points_of, scene_of, shoot
+from tests.render.shots import normals_of, points_of, shoot
+from tests.scenes import scene_of
 from tests.voxels.grids import filled
 
 

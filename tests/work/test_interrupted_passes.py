@@ -20,7 +20,8 @@ from clfractal.scene.model import Scene
 from clfractal.work.local import LocalExecutor
 from clfractal.work.refine import pass_ranges
 from clfractal.work.run import Progress, run
-from tests.render.shots import BALL, PERSPECTIVE, job_of, plan_of, scene_of, shoot, stacked
+from tests.render.shots import BALL, PERSPECTIVE, job_of, plan_of, shoot, stacked
+from tests.scenes import scene_of
 from tests.variants import one_of
 
 SIZE = (72, 48)

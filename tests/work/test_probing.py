@@ -18,7 +18,8 @@ from clfractal.pictures.probe import CHANNELS, Probe
 from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 from clfractal.work.sized import with_size
-from tests.render.shots import BALL, BALL_RADIUS, engine_of, scene_of
+from tests.render.shots import BALL, BALL_RADIUS, engine_of
+from tests.scenes import scene_of
 from tests.shell import InProcess
 
 CAMERA: dict[str, Any] = {"position": [0, -3, 0], "target": [0, 0, 0], "fov": 50}

@@ -19,7 +19,8 @@ from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 from clfractal.work.run import Progress
 from tests.pictures import scene_paths, small_films
-from tests.render.shots import BALL, engine_of, scene_of
+from tests.render.shots import BALL, engine_of
+from tests.scenes import scene_of
 from tests.shell import Ended, InProcess
 
 CAMERA: dict[str, Any] = {"position": [0, -4, 0]}

@@ -17,7 +17,8 @@ from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.work.engine import Engine
 from clfractal.work.settle import HIGHLIGHT, exposure_of, is_settled
-from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, scene_of
+from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of
+from tests.scenes import scene_of
 
 CAMERA: dict[str, Any] = {"position": [0, -3, 0], "target": [0, 0, 0], "fov": 50, "f_number": 0.5}
 SIZE = (96, 64)
