@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 from clfractal.scene.load import load_scene
@@ -13,16 +14,38 @@ from clfractal.scene.model import Scene
 BALL_ITERATIONS = 8
 
 
+def sections_of(
+    formula: Mapping[str, Any] | str = "mandelbulb",
+    camera: Mapping[str, Any] | None = None,
+    size: tuple[int, int] | None = (64, 64),
+    *,
+    iterations: int | None = None,
+    **sections: Any,
+) -> dict[str, Any]:
+    """What a scene's file has: a formula, a camera, a picture's size and other sections, each of which replaces those.
+
+    Args:
+        formula: one of the library, a whole section, or an inline formula.
+        size: None: that of all scenes that do not say one.
+        iterations: None: the section's own, and of an inline formula enough for a ball.
+    """
+    section = {"name": formula} if isinstance(formula, str) else dict(formula)
+    if "map" in section:
+        section = {"inline": section, "iterations": BALL_ITERATIONS}
+    if iterations is not None:
+        section["iterations"] = iterations
+    image = {} if size is None else {"image": {"width": size[0], "height": size[1]}}
+    return {"version": 1, "formula": section, **image, "camera": dict(camera or {}), **sections}
+
+
 def scene_of(
-    formula: Mapping[str, Any],
-    camera: Mapping[str, Any],
-    size: tuple[int, int] = (64, 64),
+    formula: Mapping[str, Any] | str = "mandelbulb",
+    camera: Mapping[str, Any] | None = None,
+    size: tuple[int, int] | None = (64, 64),
+    *,
+    folder: Path | None = None,
+    overrides: Sequence[str] = (),
     **sections: Any,
 ) -> Scene:
-    """A scene of a whole `formula` section, or of an inline formula (with enough iterations for a ball)."""
-    if "map" in formula:
-        formula = {"inline": dict(formula), "iterations": BALL_ITERATIONS}
-    image = {"width": size[0], "height": size[1]}
-    return load_scene(
-        {"version": 1, "formula": dict(formula), "image": image, "camera": dict(camera), **sections}
-    )
+    """The scene of such sections, with values replaced as by `--set`; the files that it names lie in `folder`."""
+    return load_scene(sections_of(formula, camera, size, **sections), folder=folder, overrides=overrides)

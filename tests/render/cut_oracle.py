@@ -10,10 +10,10 @@ import numpy.typing as npt
 
 from clfractal.formulas import reference
 from clfractal.scene.cut_plane import CutPlane
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import BoxObject, SphereObject
 from clfractal.scene.palette import named_table
+from tests import scenes
 from tests.render.objects_oracle import rotation_of
 from tests.render.shots import BALL, Floats, to_sphere
 
@@ -50,22 +50,19 @@ BODIES = ("set", *OBJECTS)
 
 def scene_of(**sections: Any) -> Scene:
     """The ball of radius RADIUS, the objects, and no light, unless the sections say otherwise."""
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": BALL, "iterations": 3},
-            "image": {"width": 72, "height": 56},
-            "camera": {"position": [0.6, -5.2, 2.4], "target": [0, 0, -0.1], "fov": 44},
-            "renderer": {"detail": 0.05},
-            "material": {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]},
-            "materials": {"mirror": MIRROR},
-            "objects": OBJECTS,
-            "cut_planes": PLANES,
-            "lights": [],
-            "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
-            **sections,
-        }
-    )
+    usual: dict[str, Any] = {
+        "formula": {"inline": BALL, "iterations": 3},
+        "camera": {"position": [0.6, -5.2, 2.4], "target": [0, 0, -0.1], "fov": 44},
+        "size": (72, 56),
+        "renderer": {"detail": 0.05},
+        "material": {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]},
+        "materials": {"mirror": MIRROR},
+        "objects": OBJECTS,
+        "cut_planes": PLANES,
+        "lights": [],
+        "background": {"top": [0, 0, 0], "bottom": [0, 0, 0]},
+    }
+    return scenes.scene_of(**{**usual, **sections})
 
 
 @dataclass

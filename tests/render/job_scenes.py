@@ -10,24 +10,18 @@ import numpy as np
 from PIL import Image
 
 from clfractal.files.exr import write_exr
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from tests import scenes
 from tests.render.layouts import VIEWS
 from tests.render.shots import BALL, PERSPECTIVE
 from tests.render.volumes import keep, middles
-from tests.scenes import BALL_ITERATIONS
 
 SIZE = (48, 40)
 
 
 def scene_of(folder: Path, **sections: Any) -> Scene:
-    plain = {
-        "version": 1,
-        "formula": {"inline": BALL, "iterations": BALL_ITERATIONS},
-        "image": {"width": SIZE[0], "height": SIZE[1]},
-        "camera": PERSPECTIVE,
-    }
-    return load_scene({**plain, **sections}, folder=folder)
+    usual: dict[str, Any] = {"formula": BALL, "camera": PERSPECTIVE, "size": SIZE}
+    return scenes.scene_of(folder=folder, **{**usual, **sections})
 
 
 def lit_by_a_file(folder: Path) -> Scene:

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 import clfractal
 from clfractal.scene.model import Scene
+from tests.scenes import sections_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -21,16 +22,14 @@ GREY = {"top": [1, 1, 1], "bottom": [1, 1, 1]}
 
 def scene_of(**sections: Any) -> Scene:
     """A ball of radius 1 in 48 x 48 pixels, unless the sections say otherwise."""
-    values: dict[str, Any] = {
-        "version": 1,
+    usual: dict[str, Any] = {
         "formula": BALL,
         "camera": {"position": [0, -4, 0], "fov": 40},
-        "image": {"width": 48, "height": 48},
+        "size": (48, 48),
         "lights": [],
         "background": BLACK,
-        **sections,
     }
-    return clfractal.Scene(**values)
+    return clfractal.Scene(**sections_of(**{**usual, **sections}))
 
 
 def seen(scene: Scene, samples: int) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:

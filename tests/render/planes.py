@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from clfractal.pictures.film import Film
 from clfractal.renderers.cut_plane import renderer_of
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.plane import Placed
+from tests.scenes import scene_of
 
 Floats = npt.NDArray[np.float64]
 Counts = npt.NDArray[np.int64]
@@ -34,20 +34,8 @@ def plane_scene(
     section: dict[str, Any] = {"name": formula} if isinstance(formula, str) else dict(formula)
     if "map" in section:
         section = {"inline": section}
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"iterations": iterations, **section},
-            "image": {"width": size[0], "height": size[1]},
-            "camera": {},
-            "renderer": {
-                "type": "cut_plane",
-                "plane": dict(plane or {}),
-                "iterations": plane_iterations,
-                **renderer,
-            },
-        }
-    )
+    cut = {"type": "cut_plane", "plane": dict(plane or {}), "iterations": plane_iterations}
+    return scene_of({"iterations": iterations, **section}, size=size, renderer={**cut, **renderer})
 
 
 def pixel_points(scene: Scene) -> Floats:

@@ -11,13 +11,12 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
+from tests import scenes
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import keep, middles, own_rays, to_box, value_at
-from tests.scenes import BALL_ITERATIONS
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -67,22 +66,17 @@ def cloud(file: str, albedo: float = 0.0, opacity: float = OPACITY, **given: Any
 def scene_of(
     folder: Path, objects: dict[str, Any], bounces: int = 0, samples: int = 256, **sections: Any
 ) -> Scene:
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": NOWHERE, "iterations": BALL_ITERATIONS},
-            "image": {"width": 24, "height": 24},
-            "camera": CAMERA,
-            "renderer": {"samples": samples, "filter_width": 0.1},
-            "lighting": {"mode": "path", "bounces": bounces},
-            "material": {"color": [1, 1, 1], "diffuse": 1, "specular": 0},
-            "lights": [],
-            "objects": objects,
-            **BLACK,
-            **sections,
-        },
-        folder=folder,
-    )
+    usual: dict[str, Any] = {
+        "formula": NOWHERE,
+        "camera": CAMERA,
+        "size": (24, 24),
+        "renderer": {"samples": samples, "filter_width": 0.1},
+        "lighting": {"mode": "path", "bounces": bounces},
+        "material": {"color": [1, 1, 1], "diffuse": 1, "specular": 0},
+        "lights": [],
+        "objects": objects,
+    }
+    return scenes.scene_of(folder=folder, **{**usual, **BLACK, **sections})
 
 
 def light_of(scene: Scene, device: Device, **settings: Any) -> Floats:

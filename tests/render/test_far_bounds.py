@@ -14,6 +14,7 @@ from benchmarks.truth.solid import Solid
 from clfractal.device.select import Device
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from tests import scenes
 from tests.render.shots import engine_of, points_of, shoot
 
 FORMULAS = {
@@ -30,7 +31,7 @@ MORE = {
 
 def scene_of(formula: dict[str, Any], far: float, bounds: float | None) -> Scene:
     """A formula from so far away, and with bounds that are so large, in radii of its ball; the picture shows the ball."""
-    chain = load_scene({"version": 1, "formula": formula, "camera": {"position": [0, -3, 0]}}).chain
+    chain = scenes.scene_of(formula).chain
     center, radius = np.array(chain.center), chain.radius
     toward = np.array([0.5, -1, 0.4]) / np.linalg.norm([0.5, -1, 0.4])
     renderer: dict[str, Any] = {"type": "surface", "step": radius / 100}
@@ -44,17 +45,7 @@ def scene_of(formula: dict[str, Any], far: float, bounds: float | None) -> Scene
         "target": [*center],
         "fov": float(np.degrees(2 * np.arctan(0.8 / far))),
     }
-    image = {"width": 160, "height": 160}
-    return load_scene(
-        {
-            "version": 1,
-            "formula": formula,
-            "camera": camera,
-            "image": image,
-            "renderer": renderer,
-            "lights": [],
-        }
-    )
+    return scenes.scene_of(formula, camera, (160, 160), renderer=renderer, lights=[])
 
 
 def check(device: Device, formula: dict[str, Any]) -> None:

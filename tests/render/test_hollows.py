@@ -10,7 +10,6 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.joined_oracle import (
     Floats,
@@ -132,16 +131,9 @@ def mould(**sections: Any) -> Scene:
         "bailout": 10,
     }
     bulb = {"type": "formula", "formula": {"name": "mandelbulb", "iterations": 7}, "position": [0, -1, 0.5]}
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": block, "iterations": 1},
-            "image": {"width": 160, "height": 128},
-            "camera": {"position": [0.9, -4.6, 2.2], "target": [0, -0.6, 0.3], "fov": 30},
-            "objects": {"bulb": {**bulb, "join": "cut"}},
-            **sections,
-        }
-    )
+    camera = {"position": [0.9, -4.6, 2.2], "target": [0, -0.6, 0.3], "fov": 30}
+    usual: dict[str, Any] = {"iterations": 1, "objects": {"bulb": {**bulb, "join": "cut"}}}
+    return scene_of(block, camera, (160, 128), **{**usual, **sections})
 
 
 def ways(scene: Scene, t: Floats, direction: Floats, origin: Floats, width: Floats) -> npt.NDArray[np.bool_]:

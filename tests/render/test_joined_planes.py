@@ -12,6 +12,7 @@ from clfractal.formulas import reference
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
+from tests import scenes
 from tests.variants import one_of
 from tests.voxels.joined import EVERY_JOIN, belongs, held_by, own_places
 
@@ -23,25 +24,14 @@ def scene_of(renderer: dict[str, Any], **plane: Any) -> Any:
     """A plane across the set and all objects at y = 0.1, seen straight on: pixels are 4 / SIDE wide."""
     named = ["egg", "box"] if renderer["type"] == "surface" else []
     place = {"center": [0, 0.1, 0], "normal": [0, -1, 0], "width": 4, "height": 4}
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbulb", "iterations": 7},
-            "camera": {"projection": "orthographic", "position": [0, -5, 0], "height": 4},
-            "image": {"width": SIDE, "height": SIDE},
-            "renderer": renderer,
-            "objects": OBJECTS,
-            "cut_planes": [
-                {
-                    "plane": place,
-                    "cut": True,
-                    "objects": named,
-                    "opacity": 1,
-                    "colors": {"mode": "stepped"},
-                    **plane,
-                }
-            ],
-        }
+    usual = {"cut": True, "objects": named, "opacity": 1, "colors": {"mode": "stepped"}}
+    return scenes.scene_of(
+        {"name": "mandelbulb", "iterations": 7},
+        {"projection": "orthographic", "position": [0, -5, 0], "height": 4},
+        (SIDE, SIDE),
+        renderer=renderer,
+        objects=OBJECTS,
+        cut_planes=[{"plane": place, **usual, **plane}],
     )
 
 

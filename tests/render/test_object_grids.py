@@ -12,13 +12,12 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.renderers.object_grids import brick_ranges
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
+from tests import scenes
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import PERSPECTIVE, Floats, normals_of, points_of, rays, shoot, to_sphere
 from tests.render.volumes import keep, middles, own_rays, to_box, value_at
-from tests.scenes import BALL_ITERATIONS
 
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1], "scale": [1, 1.3, 0.8]}
 ROUGH = np.random.default_rng(3).uniform(0, 1, (9, 13, 20)).astype(np.float32)
@@ -45,19 +44,14 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def scene_of(
     folder: Path, volume: dict[str, Any], size: tuple[int, int] = (48, 40), **sections: Any
 ) -> Scene:
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": NOWHERE, "iterations": BALL_ITERATIONS},
-            "image": {"width": size[0], "height": size[1]},
-            "camera": PERSPECTIVE,
-            "background": [0, 0, 0],
-            "lights": [{"direction": [1, 1, -2]}],
-            "objects": {"volume": {"type": "volume", **volume}, **sections.pop("others", {})},
-            **sections,
-        },
-        folder=folder,
-    )
+    usual: dict[str, Any] = {
+        "formula": NOWHERE,
+        "camera": PERSPECTIVE,
+        "background": [0, 0, 0],
+        "lights": [{"direction": [1, 1, -2]}],
+        "objects": {"volume": {"type": "volume", **volume}, **sections.pop("others", {})},
+    }
+    return scenes.scene_of(size=size, folder=folder, **{**usual, **sections})
 
 
 def placed_rays(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:

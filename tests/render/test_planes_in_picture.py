@@ -38,7 +38,7 @@ from tests.render.shots import (
     view_of,
 )
 from tests.render.volumes import keep, middles
-from tests.scenes import BALL_ITERATIONS
+from tests.scenes import BALL_ITERATIONS, scene_of
 
 POSITION = [1.5, -2.5, 1.2]
 CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
@@ -71,19 +71,8 @@ def picture(
 ) -> Scene:
     more = PLANES - sum(each.get("count", 1) for each in planes)
     filled = planes + [plane([0, 0, 9], [0, 0, 1], 0.0)] * more
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": formula, "iterations": iterations},
-            "image": {"width": 56, "height": 56},
-            "camera": camera,
-            "renderer": settings or RENDERERS[renderer],
-            **LOOK,
-            "cut_planes": filled,
-            **sections,
-        },
-        folder=folder,
-    )
+    usual = {"renderer": settings or RENDERERS[renderer], **LOOK, "cut_planes": filled, **sections}
+    return scene_of(formula, camera, (56, 56), iterations=iterations, folder=folder, **usual)
 
 
 def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:

@@ -16,7 +16,6 @@ from clfractal.files.exr import write_exr
 from clfractal.files.srgb import encode
 from clfractal.pictures.film import Film
 from clfractal.pictures.outputs import save_outputs
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
 from tests.render.sequence import unit_squares
@@ -172,19 +171,8 @@ def sun_scene(folder: Path, sun: float, limit: float | None, **sections: Any) ->
     bands = [{name: sky[..., i] for i, name in enumerate(RGB)}]
     write_exr(path, bands, display=size, region=(0, 0, *size), channels=RGB, half=())
     renderer = {"firefly_limit": limit, "bounces": 1, "detail": 0.05, **sections.pop("renderer", {})}
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": BALL, "iterations": 8},
-            "camera": PERSPECTIVE,
-            "image": {"width": SIDE, "height": SIDE},
-            "environment": {"file": path.name, "rays": 4},
-            "renderer": renderer,
-            "lights": [],
-            **sections,
-        },
-        folder=folder,
-    )
+    usual = {"environment": {"file": path.name, "rays": 4}, "renderer": renderer, "lights": []}
+    return scene_of(BALL, PERSPECTIVE, (SIDE, SIDE), folder=folder, **{**usual, **sections})
 
 
 def seen(film: Film) -> Floats:

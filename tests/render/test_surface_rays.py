@@ -20,7 +20,6 @@ from clfractal.files.exr import write_exr
 from clfractal.pictures.film import Film
 from clfractal.renderers.march import march_record
 from clfractal.renderers.records import HemisphereRays, hemisphere_rays
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.known_lights import BRIGHT, ground
 from tests.render.shots import (
@@ -142,18 +141,14 @@ def test_ambient_occlusion_is_the_part_of_the_hemisphere_that_is_covered(device:
 
 
 def environment_scene(folder: Path, environment: dict[str, Any], reflection: float, **settings: Any) -> Scene:
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": BALL, "iterations": 8},
-            "camera": PERSPECTIVE,
-            "image": {"width": 64, "height": 64},
-            "lights": [],
-            "environment": environment,
-            "material": {**BRIGHT, "color": [0.8, 0.5, 0.2], "diffuse": 0.9, "reflection": reflection},
-            "renderer": {"detail": 0.25, "firefly_limit": None, **settings},
-        },
+    return scene_of(
+        BALL,
+        PERSPECTIVE,
         folder=folder,
+        lights=[],
+        environment=environment,
+        material={**BRIGHT, "color": [0.8, 0.5, 0.2], "diffuse": 0.9, "reflection": reflection},
+        renderer={"detail": 0.25, "firefly_limit": None, **settings},
     )
 
 

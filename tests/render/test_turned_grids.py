@@ -16,7 +16,6 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.files.volume import Volume, read_volume, write_volume
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
 from tests.render.objects_oracle import NOWHERE
@@ -32,6 +31,7 @@ from tests.render.shots import (
     to_sphere,
 )
 from tests.render.volumes import FLAT, composited, volume_scene
+from tests.scenes import scene_of
 
 SHAPE = (38, 42, 46)
 """Voxels along the file's own axes."""
@@ -112,17 +112,14 @@ def test_an_object(device: Device, folder: Path, name: str) -> None:
 
 
 def object_scene(folder: Path, **volume: Any) -> Scene:
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": NOWHERE, "iterations": 8},
-            "image": {"width": 48, "height": 48},
-            "camera": PERSPECTIVE,
-            "background": [0, 0, 0],
-            "lights": [{"direction": [1, 1, -2]}],
-            "objects": {"v": {"type": "volume", **volume}},
-        },
+    return scene_of(
+        NOWHERE,
+        PERSPECTIVE,
+        (48, 48),
         folder=folder,
+        background=[0, 0, 0],
+        lights=[{"direction": [1, 1, -2]}],
+        objects={"v": {"type": "volume", **volume}},
     )
 
 

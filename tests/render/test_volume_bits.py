@@ -15,10 +15,10 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.files.volume import Volume, write_volume
 from clfractal.pictures.tiles import TileGrid
 from clfractal.renderers.lanes import best_lanes
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
 from clfractal.work import drawing
+from tests import scenes
 from tests.render.bits import close, same
 from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, render_tile, shoot, stacked
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
@@ -36,9 +36,8 @@ CAMERA = {"position": [1.5, -2.5, 1.5], "target": [0, 0, 0], "fov": 45}
 
 
 def scene_of(**sections: Any) -> Scene:
-    image = {"width": SIZE[0], "height": SIZE[1]}
-    plain = {"version": 1, "formula": {"inline": BALL, "iterations": 4}, "image": image, "camera": CAMERA}
-    return load_scene({**plain, "lights": LIGHTS, **sections})
+    usual: dict[str, Any] = {"formula": {"inline": BALL, "iterations": 4}, "camera": CAMERA, "size": SIZE}
+    return scenes.scene_of(**{**usual, "lights": LIGHTS, **sections})
 
 
 BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}

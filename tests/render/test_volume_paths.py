@@ -15,13 +15,13 @@ from clfractal.device.select import Device
 from clfractal.errors import SceneError
 from clfractal.renderers.volume import brick_bounds
 from clfractal.scene.grid_place import GridPlace
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
 from tests.environment_maps import write_map
 from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import in_voxels, keep, middles, to_box, value_at
+from tests.scenes import scene_of
 
 pytestmark = pytest.mark.light
 
@@ -66,28 +66,22 @@ def medium(
         "color": [{"at": 0, "color": COLOR.tolist()}],
         **given.pop("transfer", {}),
     }
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbulb"},
-            "image": {"width": 24, "height": 24},
-            "camera": CAMERA,
-            "renderer": {
-                "type": "volume",
-                "file": file,
-                "samples": samples,
-                "anisotropy": given.pop("anisotropy", 0.0),
-                "seed": given.pop("seed", 0),
-                "filter_width": 0.1,
-                "transfer": transfer,
-            },
-            "lighting": {"mode": "path", "bounces": bounces, **given.pop("lighting", {})},
-            "lights": [],
-            "background": "transparent",
-            **given,
+    usual: dict[str, Any] = {
+        "renderer": {
+            "type": "volume",
+            "file": file,
+            "samples": samples,
+            "anisotropy": given.pop("anisotropy", 0.0),
+            "seed": given.pop("seed", 0),
+            "filter_width": 0.1,
+            "transfer": transfer,
         },
-        folder=folder,
-    )
+        "lighting": {"mode": "path", "bounces": bounces, **given.pop("lighting", {})},
+        "lights": [],
+        "background": "transparent",
+        "camera": CAMERA,
+    }
+    return scene_of(size=(24, 24), folder=folder, **{**usual, **given})
 
 
 def light_of(scene: Scene, device: Device, **settings: Any) -> Floats:

@@ -11,10 +11,9 @@ import numpy.typing as npt
 
 from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.grid_place import GridPlace
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL, Floats, rays
-from tests.scenes import BALL_ITERATIONS
+from tests.scenes import scene_of
 
 # Light that shows a place's own colour, whatever its normal.
 FLAT: dict[str, Any] = {
@@ -79,18 +78,8 @@ def volume_scene(
     **renderer: Any,
 ) -> Scene:
     """A scene of a volume: of a ball that is filled, or of a `file` in `folder`."""
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": dict(formula), "iterations": BALL_ITERATIONS},
-            "image": {"width": size[0], "height": size[1]},
-            "camera": dict(camera),
-            "renderer": {"type": "volume", **renderer},
-            **look,
-            **(sections or {}),
-        },
-        folder=folder,
-    )
+    others = {"renderer": {"type": "volume", **renderer}, **look, **(sections or {})}
+    return scene_of(formula, camera, size, folder=folder, **others)
 
 
 def value_at(values: npt.NDArray[Any], places: Floats, *, nearest: bool = False) -> Floats:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
+from tests.scenes import scene_of
 
 HEAD = """\
 version: 1
@@ -17,8 +17,8 @@ camera: {position: [0, -3, 0.5], fov: 45}
 
 def moving(tracks: dict[str, Any], *, base: dict[str, Any] | None = None, **animation: Any) -> Scene:
     given: dict[str, Any] = {"fps": 10, "frames": 21, "tracks": tracks, **animation}
-    scene = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {"position": [0, -3, 0]}}
-    return load_scene({**scene, **(base or {}), "animation": given})
+    usual: dict[str, Any] = {"camera": {"position": [0, -3, 0]}, "size": None}
+    return scene_of(**{**usual, **(base or {}), "animation": given})
 
 
 def values(scene: Scene, name: str) -> list[Any]:

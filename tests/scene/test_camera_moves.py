@@ -13,16 +13,16 @@ from clfractal.errors import SceneError
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
+from tests.scenes import scene_of
 
 
 def moving(camera: dict[str, Any], tracks: dict[str, str], **others: Any) -> Scene:
     films = {"frames": 5, "tracks": {name: {"expression": text} for name, text in tracks.items()}}
-    scene = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": camera, "animation": films}
-    return load_scene({**scene, **others})
+    return scene_of(camera=camera, size=None, **{"animation": films, **others})
 
 
 def still(camera: dict[str, Any]) -> Any:
-    return load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": camera}).camera
+    return scene_of(camera=camera, size=None).camera
 
 
 @pytest.mark.parametrize(

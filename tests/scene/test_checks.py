@@ -16,6 +16,7 @@ from clfractal.formulas import catalog
 from clfractal.formulas.reference import mp_escape
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
+from tests.scenes import scene_of
 
 # A ball of radius 0.5 about the origin: z stays where it is and escapes beyond 0.5.
 BALL: dict[str, Any] = {
@@ -31,7 +32,7 @@ CUBE = {**BALL, "bailout": 10, "shape": "max(abs(x), abs(y), abs(z)) - 0.5"}
 
 
 def scene(formula: dict[str, Any], **rest: Any) -> Scene:
-    return load_scene({"version": 1, "formula": formula, "camera": {}, **rest})
+    return scene_of(formula, size=None, **rest)
 
 
 def lit(formula: dict[str, Any], *positions: Sequence[float], **rest: Any) -> Scene:

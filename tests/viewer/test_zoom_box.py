@@ -19,6 +19,7 @@ from clfractal.scene.volume import VolumeRenderer, Zoom
 from clfractal.viewer import zoom_box
 from clfractal.viewer.navigation import project
 from clfractal.viewer.zoom_box import Stage, ZoomBox, stage_of
+from tests.scenes import scene_of
 from tests.viewer.cameras import SIZE, AnyCamera, assert_same_place, cameras, numbers
 
 vectors = st.tuples(*[numbers(-1, 1)] * 3)
@@ -26,18 +27,9 @@ vectors = st.tuples(*[numbers(-1, 1)] * 3)
 
 def volume(**renderer: object) -> Scene:
     """A volume scene whose first box is no cube."""
-    return load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "hast", "iterations": 20},
-            "camera": {},
-            "renderer": {
-                "type": "volume",
-                "box": {"center": [0.5, -0.2, 0.1], "size": [4, 3, 2]},
-                **renderer,
-            },
-        }
-    )
+    box = {"center": [0.5, -0.2, 0.1], "size": [4, 3, 2]}
+    grid = {"type": "volume", "box": box, **renderer}
+    return scene_of("hast", size=None, iterations=20, renderer=grid)
 
 
 START = volume()

@@ -15,11 +15,11 @@ from clfractal.formulas import reference
 from clfractal.formulas.chain import Chain
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.grid_place import GridPlace
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
+from tests.scenes import scene_of
 
 Floats = npt.NDArray[np.float64]
 
@@ -33,16 +33,7 @@ def device() -> Device:
 
 def volume_scene(formula: str | Mapping[str, Any], iterations: int, **renderer: Any) -> Scene:
     """A scene of a formula by name or inline, with a volume renderer."""
-    section: dict[str, Any] = {"name": formula} if isinstance(formula, str) else {"inline": dict(formula)}
-    section["iterations"] = iterations
-    return load_scene(
-        {
-            "version": 1,
-            "formula": section,
-            "camera": CAMERA,
-            "renderer": {"type": "volume", **renderer},
-        }
-    )
+    return scene_of(formula, CAMERA, None, iterations=iterations, renderer={"type": "volume", **renderer})
 
 
 def place_of(

@@ -15,9 +15,9 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.renderers import points
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.volume import grid_key
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
+from tests import scenes
 from tests.render.joined_oracle import SIMPLE, Distance, Floats, a_sphere, ball, normal_at, smooth, solids
 from tests.render.shots import BALL, SOLIDS
 from tests.variants import one_of
@@ -28,8 +28,7 @@ from tests.voxels.joined import EVERY_JOIN, JULIA, SPONGE, belongs, own_places
 def scene_of(objects: dict[str, Any], formula: dict[str, Any] | None = None, **settings: Any) -> Scene:
     renderer = {"type": "volume", "box": {"size": 4.0}, "resolution": 48, **settings}
     own = formula if formula is not None else {"name": "mandelbulb", "iterations": 6}
-    scene = {"version": 1, "formula": own, "camera": {"position": [0, -4, 0]}, "renderer": renderer}
-    return load_scene({**scene, "objects": objects})
+    return scenes.scene_of(own, {"position": [0, -4, 0]}, None, renderer=renderer, objects=objects)
 
 
 def check(scene: Scene, **options: Any) -> Any:
