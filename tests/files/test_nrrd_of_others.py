@@ -19,8 +19,8 @@ import SimpleITK
 
 from clfractal.files import voxel_data
 from clfractal.files.volume import read_volume
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from tests.scenes import scene_of
 
 STEPS = np.array([[0.5, 0.25, -1.0], [2.0, 0.0, 0.75], [-0.25, 3.0, 1.5]])
 ORIGIN = np.array([10.0, -20.0, 30.0])
@@ -128,14 +128,8 @@ def test_one_block_in_three_spaces(space: str, expected: tuple[float, ...], tmp_
         "space directions: (0.1,0,0) (0,0.1,0) (0,0,0.1)\nspace origin: (-1,-1,-1)\n\n".encode()
         + values.tobytes()
     )
-    scene: Scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbulb"},
-            "camera": {},
-            "renderer": {"type": "volume", "file": "v.nrrd"},
-        },
-        folder=tmp_path,
+    scene: Scene = scene_of(
+        {"name": "mandelbulb"}, {}, None, folder=tmp_path, renderer={"type": "volume", "file": "v.nrrd"}
     )
     grid = scene.given
     assert grid is not None

@@ -12,7 +12,6 @@ from benchmarks.truth.losses import measure_losses
 from benchmarks.truth.picture import see
 from benchmarks.truth.solid import Solid
 from clfractal.device.select import Device
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests import scenes
 from tests.render.shots import engine_of, points_of, shoot
@@ -88,14 +87,11 @@ def test_what_is_farther_out_than_the_ball_is_seen(device: Device) -> None:
         "bounds": {"center": [0, 0, 0], "radius": 0.4},
         "bailout": 10,
     }
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"inline": ball, "iterations": 1},
-            "camera": {"position": [0, -5, 0], "target": [0, 0, 0], "fov": 30},
-            "image": {"width": 96, "height": 96},
-            "renderer": {"type": "surface", "bounds": {"center": [0, 0, 0], "radius": 30}},
-        }
+    scene = scenes.scene_of(
+        {"inline": ball, "iterations": 1},
+        {"position": [0, -5, 0], "target": [0, 0, 0], "fov": 30},
+        (96, 96),
+        renderer={"type": "surface", "bounds": {"center": [0, 0, 0], "radius": 30}},
     )
     film = shoot(scene, device)
     hit = film["A"] == 1

@@ -16,7 +16,6 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
 from clfractal.renderers.plan import choose_precision
-from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.planes import mandelbrot, sure
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
@@ -242,28 +241,20 @@ def test_a_plane_in_a_deep_zoom(device: Device) -> None:
         return
     x, y = -0.743643887037151, 0.131825904205330
     scenes = [
-        load_scene(
-            {
-                "version": 1,
-                "formula": {"name": "hast", "iterations": 3000},
-                "image": {"width": 40, "height": 40},
-                "camera": {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
-                "renderer": {
-                    "type": "volume",
-                    "box": {"size": 4},
-                    "resolution": 4,
-                    "zoom": [{"center": [x, y, 0], "scale": 4e8}],
-                    "shadows": True,
-                },
-                "cut_planes": [
-                    {
-                        "plane": {"width": 4, "height": 4},
-                        "opacity": 1,
-                        "cut": cut,
-                        "colors": {"mode": "stepped"},
-                    }
-                ],
-            }
+        scene_of(
+            {"name": "hast", "iterations": 3000},
+            {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 4},
+            (40, 40),
+            renderer={
+                "type": "volume",
+                "box": {"size": 4},
+                "resolution": 4,
+                "zoom": [{"center": [x, y, 0], "scale": 4e8}],
+                "shadows": True,
+            },
+            cut_planes=[
+                {"plane": {"width": 4, "height": 4}, "opacity": 1, "cut": cut, "colors": {"mode": "stepped"}}
+            ],
         )
         for cut in (False, True)
     ]

@@ -16,6 +16,7 @@ from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.work.engine import Engine
 from tests.scene.errors import error_of, marked
+from tests.scenes import scene_of
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 VOLUME = "renderer: {type: volume, "
@@ -182,14 +183,8 @@ def test_a_file_is_not_zoomed(folder: Path) -> None:
     [{"value": "iterations", "store": "float"}, {"fill": "brute"}, {"fill": "brute", "value": "coverage"}],
 )
 def test_a_grid_that_does_not_fit_is_told_before_anything_starts(keys: dict[str, Any]) -> None:
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbulb"},
-            "image": {"width": 8, "height": 8},
-            "camera": {},
-            "renderer": {"type": "volume", "resolution": 16384, **keys},
-        }
+    scene = scene_of(
+        {"name": "mandelbulb"}, {}, (8, 8), renderer={"type": "volume", "resolution": 16384, **keys}
     )
     with pytest.raises(DeviceError) as caught:
         Engine(choose()).render(scene, lambda _: pytest.fail("it began"), precision="float32")

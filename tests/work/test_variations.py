@@ -37,6 +37,7 @@ from clfractal.work.variations import (
 from clfractal.work.varied import AMOUNT, Kind, Strength, is_locked, rounded
 from clfractal.work.vary_colors import Grade
 from clfractal.work.vary_formula import expanded, moved_value, shown_parameters, slots
+from tests.scenes import scene_of
 from tests.variants import every
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
@@ -323,13 +324,7 @@ def test_the_camera_keeps_its_target_and_does_not_turn_over() -> None:
 
 
 def test_the_camera_follows_a_set_that_grows() -> None:
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbox", "parameters": {"scale": 2}},
-            "camera": {"position": [0, -20, 0]},
-        }
-    )
+    scene = scene_of({"name": "mandelbox", "parameters": {"scale": 2}}, {"position": [0, -20, 0]}, None)
     grown = [
         each
         for each in variations(scene, strength="heavy", kinds=["formula"])
