@@ -12,6 +12,8 @@ from clfractal.scene.model import Scene
 # Squaring the quaternion x + iy + jz squares its length, so after n applications |z| <= 4 is the ball of radius
 # 4^(2^-n) exactly.
 BALL_ITERATIONS = 8
+HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
+"""The least that the text of a scene has; further sections may follow."""
 
 
 def sections_of(

@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import space_to_state
+from tests.devices import device
 from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
 from tests.small_kernels import LOADS, SmallKernels
 
@@ -110,16 +110,6 @@ class Orbit:
     dual_values: Floats  # (steps, size, n)
     jacobian: Floats  # (steps, size, 3, n)
     growth: Floats  # (steps, n)
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
-
-
-def usable(precision: Precision) -> bool:
-    """A device without float64 has nothing to show in it; the message for users is tested elsewhere."""
-    return precision == "float32" or has_float64(device().info)
 
 
 @lru_cache

@@ -11,12 +11,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from functools import lru_cache
 
 import pytest
 
 from clfractal.device import compiler, program
-from clfractal.device.select import Device, choose, has_float64
+from clfractal.device.select import has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.files.channels import CHANNELS
@@ -27,6 +26,7 @@ from clfractal.renderers.plan import Plan
 from clfractal.renderers.points import program_text
 from clfractal.scene.load import load_scene
 from clfractal.solids import Body
+from tests.devices import device
 from tests.formulas.opencl_batch import kernel_file, numbered
 
 SCENE = """\
@@ -38,11 +38,6 @@ coloring: {by: %s}
 # With Jacobians, with a scalar derivative, a chain, and a shape.
 KINDS = ("hast", "quaternion_julia", "mengerbulb", "sierpinski_tetrahedron")
 FORMULA = '#line 1 "generated/formula.h"'
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
 
 
 def points_text(name: str, precision: Precision, lanes: int) -> str:

@@ -19,8 +19,9 @@ from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import parse
 from clfractal.formulas.nodes import Call, Name, Node
 from clfractal.formulas.opencl import write_formula
+from tests.devices import usable
 from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
-from tests.formulas.orbits import ORBITS, device, usable
+from tests.formulas.orbits import ORBITS, device
 from tests.formulas.rounding import spread
 from tests.formulas.trees import VARIABLES, tame_tree
 

@@ -10,10 +10,10 @@ import mpmath
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.resources import folder
+from tests.devices import device, usable
 from tests.numbers.arguments import COUNT, Floats, arguments, partials
 from tests.numbers.comparison import Range, partial_fault, value_fault
 from tests.numbers.operations import Operation, table
@@ -36,11 +36,6 @@ def tried(name: str, precision: Precision) -> Floats:
 
 
 @lru_cache
-def device() -> Device:
-    return choose()
-
-
-@lru_cache
 def results(precision: Precision) -> dict[int, tuple[Floats, Floats]]:
     """For each lane count what all operations of `real` and of `dual` gave."""
     table_here = operations(precision)
@@ -55,11 +50,6 @@ def results(precision: Precision) -> dict[int, tuple[Floats, Floats]]:
         found[lanes] = (real, runner.run("dual", dual_arguments, partials(precision)))
     assert found
     return found
-
-
-def usable(precision: Precision) -> bool:
-    """A device without float64 has nothing to show in it; the message for users is tested elsewhere."""
-    return precision == "float32" or has_float64(device().info)
 
 
 def distinct(found: dict[int, Floats]) -> Iterator[tuple[int, int, list[float]]]:

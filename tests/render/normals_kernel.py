@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
+from tests.devices import device
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 Masks = npt.NDArray[np.bool_]
@@ -86,12 +86,6 @@ class Normals:
             "triangle": (self.triangle, self.triangle_usable),
             "mean": (self.mean, self.mean_usable),
         }
-
-
-@cache
-def device() -> Device:
-    """The device that programs are tested on: the one users get, or CLFRACTAL_DEVICE."""
-    return choose()
 
 
 @cache

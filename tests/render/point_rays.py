@@ -16,10 +16,10 @@ from clfractal.device.select import Device
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
 from tests.render import normals_oracle as oracle
+from tests.render.normals_oracle import unit
 from tests.render.sequence import hashed, truth
 from tests.render.shots import (
-    ORTHOGRAPHIC,
-    PERSPECTIVE,
+    CAMERAS,
     SOLIDS,
     SPHERE_CENTER,
     SPHERE_RADIUS,
@@ -34,7 +34,6 @@ Bools = npt.NDArray[np.bool_]
 
 SIDE, DETAIL, COUNT = 48, 0.05, 9
 LAMP = np.array([0.48, -0.6, 0.64])  # direction to the light
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 Variant = tuple[str, str, str]
 
 
@@ -136,19 +135,9 @@ def shot(device: Device, variant: Variant, camera: str, seed: int = 0) -> Shot:
     return Shot(scene, shoot(scene, device), across, below, origin, way, footprint)
 
 
-def unit(vectors: Floats) -> Floats:
-    """Vectors (..., 3) at length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
 def in_frame(frame: Floats, places: Floats) -> Floats:
     """Places (n, count, 3) seen from their mean, in pixels' frames (n, 3, 3)."""
     return np.asarray(np.einsum("nab,nkb->nka", frame, places - np.nanmean(places, axis=1, keepdims=True)))
-
-
-def degrees(a: Floats, b: Floats) -> Floats:
-    """The angle between vectors of length 1, however small."""
-    return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))
 
 
 def made_of(kind: str, frame: Floats, places: Floats) -> Floats:

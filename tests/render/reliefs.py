@@ -55,7 +55,3 @@ def displaced(found: dict[str, Floats], gradient: Floats, eye: Floats = EYE) -> 
     facing, turned = (n * toward).sum(axis=-1), (slope * toward).sum(axis=-1)
     lowered = np.where(turned > 0.9 * facing, 0.9 * facing / np.where(turned > 0, turned, 1), 1.0)
     return unit(n - lowered[:, None] * slope)
-
-
-def degrees(a: Floats, b: Floats) -> Floats:
-    return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))

@@ -70,6 +70,7 @@ SOLIDS: dict[str, Any] = {
 
 PERSPECTIVE = {"position": [1.5, -2.5, 1.2], "target": [0.1, 0.05, 0], "up": [0.1, 0, 1], "fov": 48}
 ORTHOGRAPHIC = {"projection": "orthographic", "position": [1, -2, 1.5], "target": [0, 0.1, 0], "height": 2.6}
+CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 
 
 def plan_of(scene: Scene, device: Device, precision: Precision = "float32", **settings: Any) -> Plan:
@@ -208,3 +209,8 @@ def view_of(scene: Scene) -> View:
 
 def colors(film: Film) -> Floats:
     return stacked(film, ("R", "G", "B")).astype(float)
+
+
+def degrees(a: Floats, b: Floats) -> Floats:
+    """The angle between vectors of length 1, however small."""
+    return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))

@@ -17,7 +17,8 @@ from clfractal.renderers.points import distances
 from clfractal.scene.load import dump_scene
 from tests.render.color_maps import BULB, ramp
 from tests.render.path_scenes import path, seen
-from tests.render.reliefs import EYE, Floats, degrees, displaced, facts, relief, unit
+from tests.render.reliefs import EYE, Floats, displaced, facts, relief, unit
+from tests.render.shots import degrees
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

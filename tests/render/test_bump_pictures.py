@@ -12,7 +12,8 @@ from PIL import Image
 import clfractal
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
-from tests.render.reliefs import degrees, displaced, facts, relief
+from tests.render.reliefs import displaced, facts, relief
+from tests.render.shots import degrees
 
 
 def waves(folder: Path, count: int = 256) -> None:

@@ -9,10 +9,11 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device, choose, has_float64
+from clfractal.device.select import Device, has_float64
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
+from tests.devices import device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.planes import plane_scene
 from tests.render.point_checks import agree, orbit_bytes
@@ -41,11 +42,6 @@ ITERATIONS = 7
 
 def chain_of(name: str) -> Chain:
     return catalog.load_chain({"chain": CHAINS[name], "bailout": 12})
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
 
 
 @lru_cache

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device, choose, has_float64
+from clfractal.device.select import has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.formulas.opencl import write_formula
@@ -18,6 +18,7 @@ from clfractal.renderers import records
 from clfractal.renderers.kinds import TRAPS, kind_text
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
+from tests.devices import device
 from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
 from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
 from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
@@ -77,11 +78,6 @@ __kernel void colors(__global const scalar *points, __global scalar *result, int
     store(result + 2 * stride + first, found.b);
 }
 """
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
 
 
 def usable(precision: Precision) -> Precision:

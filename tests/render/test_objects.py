@@ -14,7 +14,7 @@ from clfractal.scene.movement import movement_of
 from tests.render.objects_oracle import NOWHERE, met
 from tests.render.shots import (
     BALL,
-    ORTHOGRAPHIC,
+    CAMERAS,
     PERSPECTIVE,
     QUICK_BALL,
     normals_of,
@@ -28,7 +28,6 @@ from tests.render.shots import (
 from tests.scenes import scene_of
 from tests.variants import one_of
 
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 TURNED = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1]}
 OBJECTS: dict[str, dict[str, Any]] = {
     "plane": {"type": "plane", "position": [0, 0, -0.4], "normal": [0.3, -0.2, 2]},

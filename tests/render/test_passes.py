@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import pytest
@@ -17,31 +16,12 @@ from clfractal.renderers.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import run
-from tests.render.shots import BALL, CHANNELS, PERSPECTIVE, job_of, plan_of, shoot, stacked
-from tests.scenes import scene_of
+from tests.render.passes import RENDERERS, SIZE, scene_with
+from tests.render.shots import CHANNELS, job_of, plan_of, shoot, stacked
 from tests.variants import one_of
 
-SIZE = (72, 48)
 NOISY = {"samples": 16, "noise": 0.02, "min_samples": 4}
-RENDERERS: dict[str, dict[str, Any]] = {
-    "surface": {},
-    "volume": {"type": "volume", "resolution": 32},
-    "fog": {
-        "type": "volume",
-        "resolution": 32,
-        "value": "coverage",
-        "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.5}]},
-    },
-    "cut_plane": {"type": "cut_plane", "plane": {"width": 3, "height": 2}},
-}
 SPLITS = ((1, 1, 2, 12), (16,), (4, 4, 4, 4), (5, 11), (3, 1, 8, 4))
-
-
-def scene_with(kind: str, **settings: object) -> Scene:
-    lights = [{"direction": [-1, 1, -1], "angular_size": 4, "rays": 2}]
-    renderer = {**RENDERERS[kind], "samples": 16, **settings}
-    formula = {"name": "hast", "iterations": 12} if kind == "cut_plane" else BALL
-    return scene_of(formula, PERSPECTIVE, SIZE, renderer=renderer, lights=lights)
 
 
 def in_passes(

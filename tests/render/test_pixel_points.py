@@ -15,27 +15,18 @@ from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import GRID_NORMALS
 from tests.render import normals_oracle as oracle
-from tests.render.point_rays import (
-    CAMERAS,
-    COUNT,
-    DETAIL,
-    LAMP,
-    Variant,
-    degrees,
-    in_frame,
-    made_of,
-    scene_for,
-    shot,
-    unit,
-)
+from tests.render.normals_oracle import unit
+from tests.render.point_rays import COUNT, DETAIL, LAMP, Variant, in_frame, made_of, scene_for, shot
 from tests.render.programs import compile_all
 from tests.render.shots import (
     BALL,
+    CAMERAS,
     CHANNELS,
     QUICK_BALL,
     SOLIDS,
     SPHERE_CENTER,
     SPHERE_RADIUS,
+    degrees,
     normals_of,
     points_of,
     rays,

@@ -12,12 +12,21 @@ from clfractal.device.select import Device
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
-from tests.render.shots import BALL_RADIUS, ORTHOGRAPHIC, PERSPECTIVE, Floats, points_of, rays, shoot, stacked
+from tests.render.shots import (
+    BALL_RADIUS,
+    CAMERAS,
+    ORTHOGRAPHIC,
+    PERSPECTIVE,
+    Floats,
+    points_of,
+    rays,
+    shoot,
+    stacked,
+)
 from tests.render.volumes import keep, middles, to_box, value_at, volume_scene
 
 CORNER, VOXEL, SIDES = np.array([-1.0, -1.0, -1.0]), 0.0625, (32, 32, 32)
 OPACITY = 0.06
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 
 
 def fog_scene(folder: Path, camera: dict[str, Any], planes: list[dict[str, Any]]) -> tuple[Scene, Any]:

@@ -22,7 +22,7 @@ from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_
 from tests.render.shots import (
     BALL,
     BALL_RADIUS,
-    ORTHOGRAPHIC,
+    CAMERAS,
     PERSPECTIVE,
     SOLIDS,
     SPHERE_CENTER,
@@ -40,7 +40,6 @@ from tests.render.volumes import keep, middles
 from tests.scenes import BALL_ITERATIONS, scene_of
 
 POSITION = [1.5, -2.5, 1.2]
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 RENDERERS: dict[str, dict[str, Any]] = {
     "surface": {"type": "surface", "detail": 0.05},
     "volume": {

@@ -10,29 +10,19 @@ import numpy as np
 import pytest
 
 from clfractal.device.orbit import EXTRA_APPLICATIONS
-from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.renderers import points
+from tests.devices import device, usable
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.point_checks import Floats, agree, orbit_bytes
 from tests.small_kernels import SmallKernels
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
-
-
-def usable(precision: Precision) -> bool:
-    """A device without float64 has nothing to show in it; the message for users is tested elsewhere."""
-    return precision == "float32" or has_float64(device().info)
 
 
 def only(kernel: str) -> str:

@@ -11,6 +11,7 @@ from clfractal.device.select import Device
 from tests.render.shots import (
     BALL,
     BALL_RADIUS,
+    CAMERAS,
     CHANNELS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -29,7 +30,6 @@ from tests.render.shots import (
 )
 from tests.scenes import scene_of
 
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 # In float32 coordinates near 1 and depths near 3 come in steps of 1e-7 and 2e-7; some operations add up.
 ROUNDING = 2e-6
 # Hit distances before the hit: nowhere farther off is light computed. (Near a rim, five above the ball is far before it.)

@@ -14,6 +14,7 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
 from tests.render.shots import (
     BALL_RADIUS,
+    CAMERAS,
     CHANNELS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -30,7 +31,6 @@ from tests.render.volumes import FLAT, LIT, SIDES, composited, keep, middles, to
 
 CORNER, VOXEL = np.array([-1.15, -1.45, -1.1]), 0.0625
 CENTER, RADIUS = np.array([0.1, 0.05, -0.1]), 0.8
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 COLOR = np.array(FLAT["material"]["color"])
 # Opacity in proportion to the value, 0.1 of a voxel's side where it is 1.
 FOG = {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.1}]}

@@ -12,6 +12,7 @@ from clfractal.device.select import Device
 from tests.render.shots import (
     BALL,
     BALL_RADIUS,
+    CAMERAS,
     CHANNELS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
@@ -26,7 +27,6 @@ from tests.render.shots import (
 )
 from tests.render.volumes import LIT, keep, middles, volume_scene
 
-CAMERAS = {"perspective": PERSPECTIVE, "orthographic": ORTHOGRAPHIC}
 BOX = {"center": [0, 0, 0], "size": 2.5}
 # Not a cube, sides of voxels 0.05, 0.0625 and 0.04.
 LONG = {"center": [0.1, -0.05, 0.02], "size": [2.5, 3.0, 2.4]}

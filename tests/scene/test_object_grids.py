@@ -16,8 +16,8 @@ from clfractal.scene.object_grids import placed, volumes_of
 from clfractal.scene.objects import MAX_VOLUMES
 from tests.render.objects_oracle import rotation_of
 from tests.render.volumes import keep, value_at
+from tests.scenes import HEAD
 
-HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 VALUES = np.random.default_rng(1).uniform(2, 7, (4, 5, 6)).astype(np.float32)
 VALUES[0, 0, 0], VALUES[3, 4, 5] = 2, 7
 PATHS = "lighting: {mode: path}\n"

@@ -20,8 +20,8 @@ from clfractal.scene.objects import (
     SphereObject,
 )
 from tests.render.objects_oracle import rotation_of
+from tests.scenes import HEAD
 
-HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 STEEL = "materials: {steel: {}, clay: {}}\n"
 MANY = ", ".join(f"b{n}: {{}}" for n in range(MAX_OBJECTS + 1))
 

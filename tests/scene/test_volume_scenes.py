@@ -16,9 +16,8 @@ from clfractal.files.volume import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.work.engine import Engine
 from tests.scene.errors import error_of, marked
-from tests.scenes import scene_of
+from tests.scenes import HEAD, scene_of
 
-HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 VOLUME = "renderer: {type: volume, "
 PLANE = "cut_planes: [{"
 

@@ -71,3 +71,12 @@ def slow(monkeypatch: pytest.MonkeyPatch) -> Slow:
     monkeypatch.setattr(cache, "load_blob", lambda key: None)
     monkeypatch.setattr(cache, "store_blob", lambda key, blob: None)
     return found
+
+
+@pytest.fixture
+def drawing_context() -> Iterator[None]:
+    """Panels are drawn into no window."""
+    from tests.viewer.panel_harness import headless  # which needs the libraries of a window
+
+    with headless():
+        yield

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -13,13 +11,8 @@ pytest.importorskip("imgui_bundle")
 
 from clfractal.viewer.panels import color_button
 from tests.viewer.fields import BOX, stage_of
-from tests.viewer.panel_harness import headless
 
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 
 colors = st.lists(st.floats(0, 1e3), min_size=3, max_size=3)

@@ -16,9 +16,8 @@ from clfractal.files.document import read_document
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.viewer.panels import buttons, dialogs
 from clfractal.viewer.panels.ui import Ui
+from tests.scenes import HEAD
 from tests.viewer.panel_harness import Stage, headless, make_ui
-
-BULB = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 
 
 @dataclass
@@ -65,7 +64,7 @@ class Asked:
     """A stage with the dialogs, and where their buttons are."""
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
-        self.ui: Ui = make_ui(load_scene(SceneText(read_document(BULB), folder)))[0]
+        self.ui: Ui = make_ui(load_scene(SceneText(read_document(HEAD), folder)))[0]
         self.files = FakeFiles(folder / "scene.yaml")
         self.ui.memory["files"] = self.files
         self.places: dict[str, tuple[float, float]] = {}
@@ -172,7 +171,7 @@ def test_a_confirmation_counts_for_that_name_alone(asked: Asked, tmp_path: Path)
 
 def test_the_scene_s_own_file_needs_no_confirmation(asked: Asked, tmp_path: Path) -> None:
     own = tmp_path / "own.yaml"
-    own.write_text(BULB)
+    own.write_text(HEAD)
     asked.files.source = SimpleNamespace(path=own)
     asked.files.suggestion = own
     asked.ui.show.add("save")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -21,7 +20,9 @@ from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.sight import Sight
 from clfractal.work.engine import Engine
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENE = """
 version: 1
@@ -41,12 +42,6 @@ VIEWS = pytest.mark.parametrize(
     "view", [(), NEAR, BELOW, FLAT, ASIDE], ids=["", "near", "below", "flat", "aside"]
 )
 SOLIDS = ("sphere", "box", "cylinder", "formula")
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 @pytest.fixture(scope="module")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 
@@ -18,13 +16,9 @@ from clfractal.viewer.panels import formula, formula_library
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.pointer import project
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui, opened
+from tests.viewer.panel_harness import Stage, make_ui, opened
 
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 
 @pytest.fixture

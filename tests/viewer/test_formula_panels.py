@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pytest
 
 pytest.importorskip("imgui_bundle")
@@ -13,13 +11,9 @@ from clfractal.formulas import catalog
 from clfractal.viewer.panels import formula, formula_editor, formula_library
 from clfractal.viewer.panels.formula_editor import Editing
 from clfractal.viewer.panels.ui import Ui
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
 
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 
 def test_every_formula_can_be_chosen_and_edited_as_text() -> None:

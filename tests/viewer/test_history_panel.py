@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -16,16 +15,12 @@ from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.panels import history, menu, right_dock
 from clfractal.viewer.panels.ui import Ui
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENE = "scenes/mandelbulb.yaml"
 PARTS = ("variations", "stills", "history")
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 @pytest.fixture

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import numpy as np
 import pytest
 from hypothesis import given
@@ -14,7 +12,9 @@ pytest.importorskip("imgui_bundle")
 from clfractal.scene.maps import NumberMap
 from clfractal.viewer.panels import maps, scene_dock
 from clfractal.viewer.panels.ui import Ui
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 6}
@@ -28,12 +28,6 @@ materials:
     specular: {roughness: {by: iterations}}
 material: {name: gold}
 """
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 def opened() -> Ui:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +19,9 @@ from clfractal.scene.plane import rotated
 from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock, transfer
 from clfractal.viewer.panels.ui import Ui
 from tests.render.volumes import keep
-from tests.viewer.panel_harness import Stage, headless, make_ui, opened
+from tests.viewer.panel_harness import Stage, make_ui, opened
 
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 
 # Cut planes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -17,16 +16,12 @@ from clfractal import resources
 from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import scene_dock
 from clfractal.viewer.panels import widgets as w
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 # A surface, a volume for two eyes, planes that cut, a cut plane alone, a chain.
 SCENES = ("mandelbulb", "stereo_volume", "cut_geode", "cut_mandelbrot", "mengerbulb")
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -13,7 +12,9 @@ from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import scene_dock
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Change
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -21,12 +22,6 @@ SCENE: dict[str, Any] = {
     "camera": {},
     "renderer": {"type": "volume", "box": {"center": [0.1, 0.2, 0.3], "size": [1.0, 2.0, 3.0]}},
 }
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 @pytest.mark.parametrize("index", [0, 1, 2])

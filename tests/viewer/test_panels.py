@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -41,7 +41,9 @@ from clfractal.viewer.panels import (
 from clfractal.viewer.panels.ui import Ui
 from clfractal.work.local import LocalExecutor
 from tests.variants import one_of
-from tests.viewer.panel_harness import INFO, Stage, background, headless, make_ui, opened, screenshot
+from tests.viewer.panel_harness import INFO, Stage, background, make_ui, opened, screenshot
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENES = sorted(str(path) for path in Path("scenes").glob("*.yaml"))
 KINDS = [
@@ -50,12 +52,6 @@ KINDS = [
     "scenes/cut_mandelbrot.yaml",
     "scenes/cut_geode.yaml",
 ]
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 # Drawing

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -11,18 +10,14 @@ pytest.importorskip("imgui_bundle")
 
 from clfractal.viewer.panels import elsewhere, layout, scene_dock, transfer
 from clfractal.viewer.panels import widgets as w
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.scenes import HEAD
+from tests.viewer.panel_harness import Stage, make_ui
 
-SURFACE = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
-VOLUME = SURFACE + (
+pytestmark = pytest.mark.usefixtures("drawing_context")
+
+VOLUME = HEAD + (
     "renderer: {type: volume, resolution: 32, transfer: {opacity: [{at: 0, opacity: 0}, {at: 1, opacity: 1}]}}\n"
 )
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 class Dock:
@@ -69,7 +64,7 @@ class Dock:
 def test_what_other_modes_have_is_found(
     word: str, path: str, needs: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    dock = Dock(SURFACE, word, monkeypatch)
+    dock = Dock(HEAD, word, monkeypatch)
     assert dock.titles[-1] == "Not in use at the moment"
     setting = next(
         each for each in elsewhere.found(word, dock.ui.memory["filter.drawn"]) if each.path == path
@@ -86,11 +81,11 @@ def test_what_is_shown_is_not_told_as_missing(monkeypatch: pytest.MonkeyPatch) -
 
 def test_groups_keep_their_headings(monkeypatch: pytest.MonkeyPatch) -> None:
     """A row comes with the heading that it stands below, once; a heading without rows does not come."""
-    dock = Dock(SURFACE, "filter", monkeypatch)
+    dock = Dock(HEAD, "filter", monkeypatch)
     assert {"renderer.filter", "renderer.filter_width"} <= dock.rows
     assert dock.titles.count("Samples") == 1
     assert "Iteration" not in dock.titles
-    assert "renderer.seed" in Dock(SURFACE, "samples", monkeypatch).rows  # all of the group that is called so
+    assert "renderer.seed" in Dock(HEAD, "samples", monkeypatch).rows  # all of the group that is called so
 
 
 @pytest.mark.parametrize("word", ["transfer", "opacity", "transf func"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -27,15 +26,11 @@ from clfractal.viewer.panels import timeline as panel
 from clfractal.viewer.playing import Player
 from tests.viewer.films import MOVING, STILL, keys
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 ROWS = ("camera.position", "formula.parameters.power", "camera.fov")
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 class Film:

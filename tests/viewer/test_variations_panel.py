@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Iterator
 from typing import Any, ClassVar
 
 import numpy as np
@@ -22,15 +21,11 @@ from clfractal.viewer.panels.variations import COUNT, SPARES, Choice, Draw, show
 from clfractal.work.variations import KINDS
 from clfractal.work.variations import variations as library
 from tests.viewer.panel_clicks import Seen
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 SCENE = "scenes/mandelbulb.yaml"
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 @pytest.fixture

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import pytest
 from hypothesis import given
@@ -21,15 +20,11 @@ from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Scale, bar_part, moved_by, text_of, typed_number
 from clfractal.viewer.panels.ui import Ui
 from tests.viewer.fields import BOX, DOT, LABEL, SCENE, stage_of
-from tests.viewer.panel_harness import Stage, headless, make_ui
+from tests.viewer.panel_harness import Stage, make_ui
+
+pytestmark = pytest.mark.usefixtures("drawing_context")
 
 finite = st.floats(-1e9, 1e9)
-
-
-@pytest.fixture(autouse=True)
-def _context() -> Iterator[None]:
-    with headless():
-        yield
 
 
 # What the schema tells

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
 from clfractal.formulas.chain import Chain
@@ -19,16 +17,12 @@ from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
+from tests.devices import device
 from tests.scenes import scene_of
 
 Floats = npt.NDArray[np.float64]
 
 CAMERA = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 45}
-
-
-@lru_cache
-def device() -> Device:
-    return choose()
 
 
 def volume_scene(formula: str | Mapping[str, Any], iterations: int, **renderer: Any) -> Scene:

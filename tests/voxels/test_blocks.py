@@ -18,7 +18,8 @@ from clfractal.renderers.volume import (
 )
 from clfractal.voxels.blocks import BLOCK_BYTES, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
-from tests.voxels.grids import device, filled, place_of, volume_scene
+from tests.devices import device
+from tests.voxels.grids import filled, place_of, volume_scene
 
 RAMPS = {
     "from 0.2": [{"at": 0.2, "opacity": 0}, {"at": 0.8, "opacity": 1}],

@@ -13,7 +13,8 @@ from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.voxels.fill import FillProgress
-from tests.voxels.grids import ROUNDED, device, differing_voxels, filled, inside, volume_scene, voxel_points
+from tests.devices import device
+from tests.voxels.grids import ROUNDED, differing_voxels, filled, inside, volume_scene, voxel_points
 
 
 def check_inside(grid: Any, scene: Any, share: float = ROUNDED) -> None:

@@ -12,7 +12,8 @@ import pytest
 from clfractal.voxels import grid, programs
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.grid import Grid
-from tests.voxels.grids import device, filled, place_of, volume_scene
+from tests.devices import device
+from tests.voxels.grids import filled, place_of, volume_scene
 
 
 def of_bits() -> Grid:

@@ -20,30 +20,11 @@ from clfractal.scene.model import Scene
 from clfractal.work.local import LocalExecutor
 from clfractal.work.refine import pass_ranges
 from clfractal.work.run import Progress, run
-from tests.render.shots import BALL, PERSPECTIVE, job_of, plan_of, shoot, stacked
-from tests.scenes import scene_of
+from tests.render.passes import RENDERERS, SIZE, scene_with
+from tests.render.shots import job_of, plan_of, shoot, stacked
 from tests.variants import one_of
 
-SIZE = (72, 48)
 NOISY: dict[str, Any] = {"noise": 0.02, "min_samples": 4}
-RENDERERS: dict[str, dict[str, Any]] = {
-    "surface": {},
-    "volume": {"type": "volume", "resolution": 32},
-    "fog": {
-        "type": "volume",
-        "resolution": 32,
-        "value": "coverage",
-        "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.5}]},
-    },
-    "cut_plane": {"type": "cut_plane", "plane": {"width": 3, "height": 2}},
-}
-
-
-def scene_with(kind: str, size: tuple[int, int] = SIZE, **settings: object) -> Scene:
-    lights = [{"direction": [-1, 1, -1], "angular_size": 4, "rays": 2}]
-    renderer = {**RENDERERS[kind], "samples": 16, **settings}
-    formula = {"name": "hast", "iterations": 12} if kind == "cut_plane" else BALL
-    return scene_of(formula, PERSPECTIVE, size, renderer=renderer, lights=lights)
 
 
 class Impatient(CancelToken):
