@@ -42,7 +42,7 @@ class SmallKernels:
         lanes: int,
         *,
         generated: Mapping[str, str] | None = None,
-        defines: Mapping[str, int] | None = None,
+        defines: Mapping[str, object] | None = None,
         flags: Sequence[str] = (),
     ) -> None:
         self.device, self.precision, self.lanes = device, precision, lanes
@@ -74,19 +74,18 @@ class SmallKernels:
             arguments: arrays become buffers, numbers of NumPy are handed over as they are.
             rows: size of the second dimension of the launch.
         """
-        (place,) = (number for number, each in enumerate(arguments) if each is result)
         flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
-        given = [
-            each
-            if isinstance(each, np.generic)
-            else cl.Buffer(
+        buffers = {
+            number: cl.Buffer(
                 self.device.context, flags, hostbuf=np.ascontiguousarray(each).reshape(-1).view(np.uint8)
             )
-            for each in arguments
-        ]
+            for number, each in enumerate(arguments)
+            if isinstance(each, np.ndarray)
+        }
+        (place,) = (number for number, each in enumerate(arguments) if each is result)
         kernel = cl.Kernel(self._program, name)
-        kernel.set_args(*given)
+        kernel.set_args(*(buffers.get(number, each) for number, each in enumerate(arguments)))
         # Work-groups of one: the cheapest to compile for.
         cl.enqueue_nd_range_kernel(self.device.queue, kernel, (result.shape[-1] // self.lanes, rows), (1, 1))
-        cl.enqueue_copy(self.device.queue, result, given[place])
+        cl.enqueue_copy(self.device.queue, result, buffers[place])
         return result

@@ -15,8 +15,8 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import space_to_state
 from tests.devices import device
-from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
-from tests.small_kernels import LOADS, SmallKernels
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
+from tests.small_kernels import LOADS, Floats, SmallKernels
 
 # Of |z|: beyond it an orbit has ended in every use of these functions.
 FAR = 1000.0

@@ -14,9 +14,9 @@ from clfractal.formulas.backends import DualBackend, MpmathBackend, constant_dua
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.reference import apply, constant_of, mp_jacobian, mp_orbit
 from tests.devices import usable
-from tests.formulas.opencl_batch import Floats
 from tests.formulas.orbits import FAR, SPECS, STEPS, chain_of, orbit, points_of, start_at, texts
 from tests.formulas.rounding import NoisyBackend, spread
+from tests.small_kernels import Floats
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 

@@ -19,11 +19,12 @@ from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.language import parse
 from clfractal.formulas.nodes import Call, Name, Node
 from clfractal.formulas.opencl import write_formula
-from tests.devices import usable
-from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
-from tests.formulas.orbits import ORBITS, device
+from tests.devices import device, usable
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
+from tests.formulas.orbits import ORBITS
 from tests.formulas.rounding import spread
 from tests.formulas.trees import VARIABLES, tame_tree
+from tests.small_kernels import Floats
 
 # Three trees make a formula; a formula is applied once to points of space.
 FORMULAS = 16

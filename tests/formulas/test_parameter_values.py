@@ -20,11 +20,11 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
-from tests.devices import usable
-from tests.formulas.opencl_batch import Floats, at_points, batch_text, formula_kernels
-from tests.formulas.orbits import FAR, ORBITS, STEPS, device, points_of, start_at
+from tests.devices import device, usable
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
+from tests.formulas.orbits import FAR, ORBITS, STEPS, points_of, start_at
 from tests.formulas.rounding import spread
-from tests.small_kernels import SmallKernels
+from tests.small_kernels import Floats, SmallKernels
 from tests.variants import one_of
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]

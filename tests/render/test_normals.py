@@ -10,8 +10,10 @@ import pytest
 
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
+from tests.devices import device
 from tests.render import normals_oracle as oracle
-from tests.render.normals_kernel import Floats, Masks, Normals, device, run
+from tests.render.normals_kernel import Masks, Normals, run
+from tests.small_kernels import Floats
 
 PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 GRID = oracle.grid_offsets(3)

@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
+from tests.devices import device
 from tests.render import normals_oracle as oracle
-from tests.render.normals_kernel import Floats, device, run
+from tests.render.normals_kernel import run
+from tests.small_kernels import Floats
 
 GRID = oracle.grid_offsets(3)
 PRECISIONS = st.sampled_from(["float32", "float64"])

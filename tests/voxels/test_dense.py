@@ -10,7 +10,8 @@ import pytest
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.voxels import dense
 from clfractal.voxels.dense import grid_from_dense
-from tests.voxels.grids import device, place_of
+from tests.devices import device
+from tests.voxels.grids import place_of
 
 CORNER, SPACING = (1.0, 2.0, 3.0), (0.5, 0.25, 1.0)
 

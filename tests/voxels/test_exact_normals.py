@@ -19,7 +19,7 @@ from tests.voxels.grids import filled
 
 @pytest.fixture(scope="module")
 def device() -> Device:
-    from tests.voxels.grids import device as chosen
+    from tests.devices import device as chosen
 
     return chosen()
 

@@ -10,9 +10,10 @@ import pytest
 
 from clfractal.voxels.dense import grid_from_dense
 from clfractal.voxels.grid import Grid
+from tests.devices import device
 from tests.render.shots import BALL
 from tests.scenes import BALL_ITERATIONS
-from tests.voxels.grids import Floats, decoded, device, filled, place_of, volume_scene, voxel_points
+from tests.voxels.grids import Floats, decoded, filled, place_of, volume_scene, voxel_points
 
 BINOMIAL = {
     0: [1],

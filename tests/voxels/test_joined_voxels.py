@@ -18,10 +18,11 @@ from clfractal.renderers.volume import grid_key
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests import scenes
+from tests.devices import device
 from tests.render.joined_oracle import SIMPLE, Distance, Floats, a_sphere, ball, normal_at, smooth, solids
 from tests.render.shots import BALL, SOLIDS
 from tests.variants import one_of
-from tests.voxels.grids import ROUNDED, decoded, device, differing_voxels, filled, voxel_points
+from tests.voxels.grids import ROUNDED, decoded, differing_voxels, filled, voxel_points
 from tests.voxels.joined import EVERY_JOIN, JULIA, SPONGE, belongs, own_places
 
 

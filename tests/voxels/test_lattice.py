@@ -25,7 +25,7 @@ from clfractal.voxels.lattice import (
     unpack_places,
 )
 from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, empty_cubes
-from tests.voxels.grids import device
+from tests.devices import device
 
 
 def test_voxels_of_a_cube() -> None:
