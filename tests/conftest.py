@@ -47,22 +47,25 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
 
 
 @pytest.fixture
-def clf(
-    request: pytest.FixtureRequest,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capfd: pytest.CaptureFixture[str],
-) -> InProcess:
-    """The program, in a folder of the test's own with a scene.yaml.
+def here(request: pytest.FixtureRequest, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The current folder: one of the test's own with a scene.yaml.
 
     That is the SCENE of the test's file, none if that is None, else a small one.
     """
-    from tests.shell import SCENE, InProcess
+    from tests.shell import SCENE
 
     monkeypatch.chdir(tmp_path)
     scene = getattr(request.module, "SCENE", SCENE)
     if scene is not None:
         (tmp_path / "scene.yaml").write_text(scene)
+    return tmp_path
+
+
+@pytest.fixture
+def clf(here: Path, capfd: pytest.CaptureFixture[str]) -> InProcess:
+    """The program, in this folder."""
+    from tests.shell import InProcess
+
     return InProcess(capfd)
 
 

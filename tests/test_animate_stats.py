@@ -23,13 +23,6 @@ TILES = 3 * 2  # of 32 x 32 pixels
 SUMS = ("tiles", "tiles_resumed", "build_ms", "kernel_ms", "rays")
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 def told(path: str = "s.json") -> dict[str, Any]:
     found: dict[str, Any] = json.loads(Path(path).read_text())
     return found

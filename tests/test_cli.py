@@ -28,14 +28,6 @@ from tests.shell import SCENE, InProcess, command, environment, process
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with a scene."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    return tmp_path
-
-
-@pytest.fixture
 def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
     return InProcess(capsys)
 

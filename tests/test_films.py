@@ -137,12 +137,7 @@ def test_chroma_lies_at_the_left_pixel() -> None:
     assert list(blue) == [128, 128, 128, 128, 128 + round(112 * 0.75), 240, 240, 240]
 
 
-def test_a_film_from_the_shell(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    clf = InProcess(capfd)
+def test_a_film_from_the_shell(clf: InProcess) -> None:
     ended = clf(
         "animate", "scene.yaml", "-o", "film.mkv", "-o", "f#.png", "-o", "film.mp4", "--chroma", "rgb"
     )
@@ -164,12 +159,7 @@ def test_a_film_from_the_shell(
         np.testing.assert_array_equal(np.asarray(Image.open(f"f{number}.png")), shown)
 
 
-def test_a_film_that_was_interrupted_goes_on(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    clf = InProcess(capfd)
+def test_a_film_that_was_interrupted_goes_on(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr("clfractal.files.moving._frame", _interrupt)
         with pytest.raises(KeyboardInterrupt):
@@ -249,12 +239,7 @@ def test_what_a_film_cannot_be(asked: tuple[str, Recipe, tuple[int, int]], tmp_p
     assert REFUSED[asked] in caught.value.message
 
 
-def test_kept_frames_stay_where_an_order_is_wrong(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    clf = InProcess(capfd)
+def test_kept_frames_stay_where_an_order_is_wrong(clf: InProcess) -> None:
     Path("film.mp4.partial").mkdir()
     kept = Path("film.mp4.partial/000000.png")
     kept.write_bytes(b"hours of work")
@@ -286,12 +271,7 @@ def test_a_film_leaves_other_pictures_as_they_are(
     assert clf("animate", "scene.yaml", "-o", "a#.png", "--resume").err.endswith("were there already\n")
 
 
-def test_frames_of_another_part_stay(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    clf = InProcess(capfd)
+def test_frames_of_another_part_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     with monkeypatch.context() as patch:
         patch.setattr("clfractal.files.moving._frame", _interrupt)
         with pytest.raises(KeyboardInterrupt):
@@ -320,12 +300,7 @@ def test_without_the_package_it_says_what_to_install(tmp_path: Path, monkeypatch
         plan_film(tmp_path / "a.mp4", Recipe(), SIZE, 25)
 
 
-def test_options_of_films_need_a_film(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    clf = InProcess(capfd)
+def test_options_of_films_need_a_film(clf: InProcess) -> None:
     assert clf("animate", "scene.yaml", "--crf", "3").is_one_line(
         2, "--crf: applies to films, such as -o film.mp4"
     )

@@ -21,13 +21,6 @@ animation: {fps: 12, frames: 3, tracks: {camera.fov: {keys: [{frame: 0, value: 6
 """
 
 
-@pytest.fixture
-def clf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return InProcess(capfd)
-
-
 def _interrupt(*_: object) -> None:
     raise KeyboardInterrupt
 

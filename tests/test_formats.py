@@ -20,13 +20,6 @@ from tests.shell import SCENE, Ended, InProcess
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    return tmp_path
-
-
-@pytest.fixture
 def shell(here: Path, capsys: pytest.CaptureFixture[str]) -> InProcess:
     return InProcess(capsys)
 

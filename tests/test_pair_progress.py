@@ -29,13 +29,6 @@ TILES = 18
 
 
 @pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    return tmp_path
-
-
-@pytest.fixture
 def shell(capfd: pytest.CaptureFixture[str]) -> InProcess:
     return InProcess(capfd)
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from tests.cluster.farm import FILM, FRAMES, HEAVY, Farm, planes
+from tests.cluster.farm import FILM, FRAMES, HEAVY, Farm
+from tests.interrupts import planes
 from tests.shell import process
 
 

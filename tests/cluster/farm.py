@@ -14,9 +14,6 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-import numpy as np
-
-from clfractal.files.exr import read_exr
 from tests.shell import command, environment
 
 # Work of some ten seconds of one core, in tiles of a tenth of a second.
@@ -47,11 +44,6 @@ def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         return int(probe.getsockname()[1])
-
-
-def planes(path: Path) -> dict[str, bytes]:
-    """The bytes of every channel."""
-    return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
 
 
 class Farm:

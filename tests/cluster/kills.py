@@ -11,7 +11,8 @@ import tempfile
 import time
 from pathlib import Path
 
-from tests.cluster.farm import FILM, FRAMES, HEAVY, Client, Farm, planes
+from tests.cluster.farm import FILM, FRAMES, HEAVY, Client, Farm
+from tests.interrupts import planes
 from tests.shell import process
 
 

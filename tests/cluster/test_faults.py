@@ -14,8 +14,9 @@ import pytest
 import clfractal
 from clfractal.cluster import dispatch, link
 from clfractal.files.exr import read_exr
-from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows, planes
+from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows
 from tests.cluster.kills import kill_at_random
+from tests.interrupts import planes
 from tests.shell import command, environment, process
 
 resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")

@@ -13,7 +13,8 @@ import pytest
 import clfractal
 from clfractal.files.exr import read_exr
 from clfractal.scene import environment
-from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, journal_grows, planes
+from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, journal_grows
+from tests.interrupts import planes
 from tests.shell import process
 
 TILES = 8 * 6

@@ -9,9 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, choose
+from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
-from clfractal.device.tune import accepted_lanes
 from clfractal.renderers import records
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import PackedEnvironment, material_fields
@@ -108,12 +107,8 @@ def ask(
 
 
 VARIANTS: list[tuple[Precision, int]] = [("float32", 1), ("float32", 16), ("float32", 4)]
-
-
-def check_usable(precision: Precision, lanes: int) -> None:
-    """Skips a lane count that the engine would not use: on such a driver aborts, or crashes."""
-    if lanes not in accepted_lanes(choose(), precision):
-        pytest.skip(f"{choose().info.name} cannot run {lanes} lanes of {precision}")
+if has_float64(choose().info):
+    VARIANTS += [("float64", 8)]
 
 
 every_variant = pytest.mark.parametrize(("precision", "lanes"), VARIANTS)

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.device.select import choose, has_float64
-from clfractal.device.tune import accepted_lanes
+from clfractal.device.select import choose
+from clfractal.device.structs import Precision
 from clfractal.errors import ClfractalError
 from clfractal.renderers.points import distances
 from clfractal.scene.load import dump_scene
+from tests.devices import check_usable
 from tests.render.color_maps import BULB, ramp
 from tests.render.path_scenes import path, seen
 from tests.render.reliefs import EYE, Floats, displaced, facts, relief, unit
@@ -49,9 +50,8 @@ HEIGHTS: dict[str, tuple[dict[str, Any], Callable[[dict[str, Floats]], Floats]]]
 
 @pytest.mark.parametrize("by", one_of(*HEIGHTS))
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
-def test_normals_are_those_of_the_displaced_ball(by: str, precision: str) -> None:
-    if precision == "float64" and not has_float64(choose().info):
-        pytest.skip("the device has no float64")
+def test_normals_are_those_of_the_displaced_ball(by: str, precision: Precision) -> None:
+    check_usable(precision)
     height, gradient = HEIGHTS[by]
     found = facts(relief(height), precision=precision)
     assert degrees(found["N"], found["normal"]).max() > 20
@@ -319,8 +319,7 @@ def test_normals_face_the_viewer() -> None:
 @pytest.mark.combination
 @pytest.mark.parametrize("lanes", [4, 8, 16])
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    if lanes not in accepted_lanes(choose(), "float32"):
-        pytest.skip("the device has no such packets")
+    check_usable("float32", lanes)
     pictures = []
     for each in (1, lanes):
         monkeypatch.setenv("CLFRACTAL_LANES", str(each))

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.device.select import choose
-from clfractal.device.tune import accepted_lanes
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
+from tests.devices import check_usable
 from tests.render.glass_scenes import BODIES, ball, colors_of, glass, scene
 from tests.render.half_space import depth_function
 from tests.render.path_scenes import BLACK, path, scene_of, seen
@@ -142,8 +141,7 @@ def test_the_eye_in_milk_sees_milk() -> None:
 @pytest.mark.combination
 @pytest.mark.parametrize("lanes", [4, 16])
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    if lanes not in accepted_lanes(choose(), "float32"):
-        pytest.skip("the device has no such packets")
+    check_usable("float32", lanes)
     found = scene(
         {"body": {**BODIES["box"], "material": "milk"}}, {"milk": milk(color=[0.8, 0.9, 0.7])}, bounces=16
     )

@@ -7,10 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.formulas import reference
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
+from tests.devices import check_usable
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
@@ -182,8 +183,7 @@ def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
 @pytest.mark.parametrize("mode", MODES)
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_packets_and_single_lanes_see_the_same(device: Device, mode: str, precision: Any) -> None:
-    if precision == "float64" and not has_float64(device.info):
-        pytest.skip("the device has no float64")
+    check_usable(precision)
     scene = scene_of(**MODES[mode], lights=[{"direction": [0.2, 1, -1]}])
     films = [film_of(scene, device, precision=precision, lanes=lanes) for lanes in (1, 4, 8)]
     found, _, _ = met_by_eye(scene)

@@ -15,18 +15,16 @@ import numpy.typing as npt
 import pytest
 from scipy import stats
 
-from clfractal.device.select import choose, has_float64
 from clfractal.device.structs import Precision
 from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from clfractal.scene.environment import EnvironmentMap, read_map
 from clfractal.scene.lighting import Environment
-from tests.render.environment_kernel import VARIANTS, ask, check_usable, every_variant, settings_of
+from tests.devices import check_usable
+from tests.render.environment_kernel import ask, every_variant, settings_of
 
 Floats = npt.NDArray[np.floating[Any]]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-if has_float64(choose().info):
-    VARIANTS += [("float64", 8)]
 
 
 def a_map(height: int = 16, seed: int = 3) -> npt.NDArray[np.float32]:

@@ -9,12 +9,14 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
+from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.scene.layout import Place
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.work.run import Progress
+from tests.devices import check_usable
 from tests.render.layouts import GAP, VIEWS, scene_of
 from tests.render.shots import engine_of
 
@@ -77,8 +79,7 @@ class TestHeader:
 
     def test_each_view_has_the_number_type_it_was_made_with(self, device: Device) -> None:
         """One that looks at a spot of 10^-9 needs float64; it is told, and the others stay."""
-        if not has_float64(device.info):
-            pytest.skip("the device has no float64")
+        check_usable("float64")
         spot = {"center": [0.1, 0, 0], "width": 1e-9, "height": 1e-9}
         deep = {"renderer": {"type": "cut_plane", "plane": spot}}
         scene = scene_of([{}, deep], SIZE)
@@ -202,10 +203,9 @@ class TestAsked:
         same(engine_of(device).render(load_scene(film.header["scene"])), film)
 
     @pytest.mark.parametrize("precision", ["float32", "float64"])
-    def test_precision(self, device: Device, precision: str) -> None:
+    def test_precision(self, device: Device, precision: Precision) -> None:
         """Views that ask for the other one are overruled; the bits are those of views that ask for it themselves."""
-        if precision == "float64" and not has_float64(device.info):
-            pytest.skip("the device has no float64")
+        check_usable(precision)
         other = "float32" if precision == "float64" else "float64"
 
         def with_precision(wanted: str) -> Scene:

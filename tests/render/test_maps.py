@@ -12,14 +12,15 @@ import yaml
 from PIL import Image
 
 import clfractal
-from clfractal.device.select import choose, has_float64
-from clfractal.device.tune import accepted_lanes
+from clfractal.device.select import choose
+from clfractal.device.structs import Precision
 from clfractal.errors import ClfractalError
 from clfractal.files.srgb import decode
 from clfractal.renderers.maps import level_sizes, levels_of
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.work.prepare import prepare
+from tests.devices import check_usable
 from tests.render.color_maps import BULB, Floats, ramp
 from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
@@ -85,9 +86,8 @@ BY: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("by", BY)
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
-def test_colors_follow_quantities(by: str, precision: str) -> None:
-    if precision == "float64" and not has_float64(choose().info):
-        pytest.skip("the device has no float64")
+def test_colors_follow_quantities(by: str, precision: Precision) -> None:
+    check_usable(precision)
     colors, facts = shown(
         shining({"luminance": 1, "color": {"by": by, "palette": RAMP, **BY[by]}}), precision=precision
     )
@@ -136,8 +136,7 @@ def test_the_formula_is_asked() -> None:
 @pytest.mark.combination
 @pytest.mark.parametrize("lanes", [4, 1, 8, 16])
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    if lanes not in accepted_lanes(choose(), "float32"):
-        pytest.skip("the device has no such packets")
+    check_usable("float32", lanes)
     emission = {
         "luminance": {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]},
         "color": {"by": "normal", "palette": RAMP},

@@ -13,12 +13,11 @@ import pytest
 import yaml
 
 import clfractal
-from clfractal.device.select import choose
-from clfractal.device.tune import accepted_lanes
 from clfractal.errors import SceneError
 from clfractal.renderers.plan import make_plan
 from clfractal.renderers.surface import program_texts
 from clfractal.scene.model import Scene
+from tests.devices import check_usable
 from tests.render.glass_scenes import BODIES, colors_of, scene
 from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
@@ -189,8 +188,7 @@ def test_what_stands_in_skin_keeps_light() -> None:
 @pytest.mark.combination
 @pytest.mark.parametrize("lanes", [4, 16])
 def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    if lanes not in accepted_lanes(choose(), "float32"):
-        pytest.skip("the device has no such packets")
+    check_usable("float32", lanes)
     found = set_of(skin(radius=0.1), background={"top": [1, 0.6, 0.2], "bottom": [0.1, 0.2, 0.5]})
     pictures = []
     for each in (1, lanes):

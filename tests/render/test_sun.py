@@ -16,7 +16,8 @@ from clfractal.scene.atmosphere import SUN_RADIUS
 from clfractal.scene.lighting import Sky
 from clfractal.scene.sky import bake, pixel_areas
 from clfractal.scene.sun import SOLID_ANGLE, Sun, sun_of
-from tests.render.environment_kernel import ask, check_usable, every_variant, settings_of
+from tests.devices import check_usable
+from tests.render.environment_kernel import ask, every_variant, settings_of
 
 pytestmark = pytest.mark.light
 
