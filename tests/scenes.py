@@ -14,6 +14,17 @@ from clfractal.scene.model import Scene
 BALL_ITERATIONS = 8
 HEAD = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\n"
 """The least that the text of a scene has; further sections may follow."""
+STEREO = "stereo={mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}"
+"""Two eyes before a screen, as an override."""
+
+
+def bulb_text(size: tuple[int, int], more: str = "") -> str:
+    """The text of a small scene of a Mandelbulb, with further lines."""
+    width, height = size
+    return (
+        f"version: 1\nformula: {{name: mandelbulb, iterations: 8}}\nimage: {{width: {width}, height: {height}}}\n"
+        f"camera: {{position: [0, -2.8, 0.6]}}\n{more}"
+    )
 
 
 def sections_of(

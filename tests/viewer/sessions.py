@@ -20,15 +20,10 @@ from clfractal.viewer.session import Session
 from clfractal.work.canvas import CHANNELS
 from clfractal.work.films import JobFilms
 from clfractal.work.show import Look
+from tests.scenes import STEREO, bulb_text
 
 SIZE = (96, 64)
-BULB = f"""
-version: 1
-formula: {{name: mandelbulb, iterations: 8}}
-image: {{width: {SIZE[0]}, height: {SIZE[1]}}}
-camera: {{position: [0, -2.8, 0.6]}}
-renderer: {{samples: 4}}
-"""
+BULB = bulb_text(SIZE, "renderer: {samples: 4}\n")
 BALL = """
 version: 1
 formula:
@@ -39,7 +34,6 @@ image: {width: 96, height: 64}
 camera: {position: [0, -4, 0]}
 renderer: {samples: 1}
 """
-STEREO = "stereo={mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}"
 
 
 def scene_of(text: str = BULB, *overrides: str) -> Scene:

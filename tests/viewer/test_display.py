@@ -14,7 +14,8 @@ from clfractal.device.select import Device
 from clfractal.pictures.outputs import png_bytes
 from clfractal.viewer.display import CopyTarget, Display
 from clfractal.work.show import Look
-from tests.viewer.sessions import BULB, STEREO, films_of, scene_of, session_on, shown_frame, wait_for
+from tests.scenes import STEREO
+from tests.viewer.sessions import BULB, films_of, scene_of, session_on, shown_frame, wait_for
 
 
 @pytest.mark.parametrize("overrides", [(), (STEREO,), ("image.width=77", "output.exposure=1.5")])

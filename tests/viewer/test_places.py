@@ -11,7 +11,8 @@ from clfractal.scene.model import Scene
 from clfractal.scene.stereo import APART, Stereo
 from clfractal.viewer.places import places_of
 from clfractal.viewer.viewport import image_of, render_key
-from tests.viewer.sessions import STEREO, scene_of
+from tests.scenes import STEREO
+from tests.viewer.sessions import scene_of
 
 MODES = (
     "pair",

@@ -19,10 +19,10 @@ from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import differs_by_view, seen_from
 from clfractal.viewer.studio import Studio
+from tests.scenes import STEREO
 from tests.viewer.sessions import (
     BULB,
     SCENES,
-    STEREO,
     equal_pictures,
     films_of,
     scene_of,

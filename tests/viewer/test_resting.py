@@ -11,7 +11,8 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import FileError
 from clfractal.viewer import resting
-from tests.viewer.sessions import BULB, STEREO, films_of, scene_of, session_on, wait_for
+from tests.scenes import STEREO
+from tests.viewer.sessions import BULB, films_of, scene_of, session_on, wait_for
 
 PATHS = (
     "lighting={mode: path, bounces: 2}",

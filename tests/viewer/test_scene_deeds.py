@@ -24,12 +24,12 @@ from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
 from clfractal.work.prepare import prepare
+from tests.scenes import STEREO
 from tests.viewer.sessions import BULB, scene_of
 
 VIEW = (128, 96)
 PLANE = "renderer={type: cut_plane, plane: {width: 3, height: 2.25}}"
 VOLUME = ("renderer={type: volume, resolution: 16}", "coloring.by=solid")
-STEREO = "stereo={mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}"
 
 
 class Desk:

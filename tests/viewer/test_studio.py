@@ -16,7 +16,8 @@ from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
 from clfractal.work.canvas import CHANNELS
 from tests.pictures import read_picture
-from tests.viewer.sessions import BALL, BULB, STEREO, equal_pictures, films_of, scene_of, wait_for
+from tests.scenes import STEREO
+from tests.viewer.sessions import BALL, BULB, equal_pictures, films_of, scene_of, wait_for
 
 VIEW = (96, 64)
 

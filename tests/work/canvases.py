@@ -20,16 +20,10 @@ from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.run import run
 from clfractal.work.show import Arrangement, Look, Shower
+from tests.scenes import bulb_text
 
 SIZE = (96, 64)
-BULB = f"""
-version: 1
-formula: {{name: mandelbulb, iterations: 8}}
-image: {{width: {SIZE[0]}, height: {SIZE[1]}}}
-camera: {{position: [0, -2.8, 0.6]}}
-renderer: {{samples: 2}}
-"""
-STEREO = "stereo={mode: anaglyph, screen_width: 0.5, screen_distance: 0.7}"
+BULB = bulb_text(SIZE, "renderer: {samples: 2}\n")
 LAYOUT = (
     "layout={columns: 2, gap: 5, background: [0.2, 0.1, 0.3], views: [{}, {renderer: {type: cut_plane}}, {}]}"
 )

@@ -7,15 +7,11 @@ import numpy as np
 import clfractal
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
+from tests.scenes import bulb_text
 
-SIZE = {"width": 64, "height": 48}
+SIZE = (64, 48)
 
-BULB = f"""
-version: 1
-formula: {{name: mandelbulb, iterations: 8}}
-image: {{width: {SIZE["width"]}, height: {SIZE["height"]}}}
-camera: {{position: [0, -2.8, 0.6]}}
-"""
+BULB = bulb_text(SIZE)
 
 VOLUME = BULB + "renderer: {type: volume, resolution: 32, value: coverage}\n"
 

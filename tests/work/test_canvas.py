@@ -18,7 +18,8 @@ from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import run
-from tests.work.canvases import LAYOUT, STEREO, drawn, job_of, painted, scene_of
+from tests.scenes import STEREO
+from tests.work.canvases import LAYOUT, drawn, job_of, painted, scene_of
 
 SIZES = [(96, 64), (77, 41), (1, 1), (33, 1), (1, 70), (32, 32), (65, 33)]
 

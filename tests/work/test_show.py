@@ -23,7 +23,8 @@ from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.run import run
 from clfractal.work.show import Arrangement, Look, Shower, can_reduce
-from tests.work.canvases import LAYOUT, STEREO, drawn, films_of, job_of, look_of, painted, scene_of, shown
+from tests.scenes import STEREO
+from tests.work.canvases import LAYOUT, drawn, films_of, job_of, look_of, painted, scene_of, shown
 
 COMPOSED = (
     "split",

@@ -20,7 +20,8 @@ from clfractal.scene.layout import Place
 from clfractal.work.canvas import CHANNELS, Canvas, Part
 from clfractal.work.job import Job
 from clfractal.work.show import Arrangement, Look, Shower, smoothing_of
-from tests.work.canvases import LAYOUT, STEREO, job_of, look_of, painted, scene_of, shown
+from tests.scenes import STEREO
+from tests.work.canvases import LAYOUT, job_of, look_of, painted, scene_of, shown
 
 STRANGE = (np.nan, np.inf, -np.inf, 3e38, -3e38, 2e30)
 COVERS: dict[str, tuple[float, ...]] = {
