@@ -42,7 +42,7 @@ def sections_of(
         size: None: that of all scenes that do not say one.
         iterations: None: the section's own, and of an inline formula enough for a ball.
     """
-    section = {"name": formula} if isinstance(formula, str) else dict(formula)
+    section: dict[str, Any] = {"name": formula} if isinstance(formula, str) else dict(formula)
     if "map" in section:
         section = {"inline": section, "iterations": BALL_ITERATIONS}
     if iterations is not None:

@@ -211,6 +211,6 @@ def colors(film: Film) -> Floats:
     return stacked(film, ("R", "G", "B")).astype(float)
 
 
-def degrees(a: Floats, b: Floats) -> Floats:
+def degrees(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Floats:
     """The angle between vectors of length 1, however small."""
     return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))

@@ -144,7 +144,7 @@ def test_each_formula_has_its_own_colouring(device: Device, by: str) -> None:
         home |= {"step": 0.01, "scale": 2.0}
         there |= {"step": 0.01 * scale, "scale": 2.0 / scale}
     camera = {"position": [0.3, -2.5, 0.5], "fov": 35}
-    lit = {"material": {"ambient": 1, "diffuse": 0.2, "specular": 0}}
+    lit: dict[str, Any] = {"material": {"ambient": 1, "diffuse": 0.2, "specular": 0}}
     alone = shoot(scene_of(formula, camera, (160, 160), **lit, coloring=home), device)
     moved = {
         "position": (place + scale * np.array(camera["position"])).tolist(),

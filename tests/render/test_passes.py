@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
@@ -20,7 +21,7 @@ from tests.render.passes import RENDERERS, SIZE, scene_with
 from tests.render.shots import CHANNELS, job_of, plan_of, shoot, stacked
 from tests.variants import one_of
 
-NOISY = {"samples": 16, "noise": 0.02, "min_samples": 4}
+NOISY: dict[str, Any] = {"samples": 16, "noise": 0.02, "min_samples": 4}
 SPLITS = ((1, 1, 2, 12), (16,), (4, 4, 4, 4), (5, 11), (3, 1, 8, 4))
 
 
