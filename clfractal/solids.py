@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -25,8 +26,9 @@ _BESIDE = 0.5
 # is lifted by a quarter of the width at most, and distances that differ by more than the width do not flow.
 _FLOWS = 1.25
 
-# Defines of a text that depend on how the turns of formulas repeat themselves: one set for all of a program.
-Turns = Callable[[Sequence[Chain]], Mapping[str, object]]
+# Applications between two looks at packets of voxels, at least; and between two looks for an orbit of a plane that came
+# back: few cost time, many find it late.
+_CHUNK, _PERIOD_CHECK = 4, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,13 +53,14 @@ class Body:
         joined = scene if scene.joined else None
         return cls(scene.chain, scene.formula.iterations, joined, potential=_by_potential(scene))
 
-    def texts(self, turns: Turns | None = None) -> dict[str, str]:
+    def texts(self, *, turns: bool = False) -> dict[str, str]:
         """The generated text of a program that asks it, `formula.h`.
 
         Solids that are joined are a list that programs read. Of a scene with such solids only the formulas are text.
+        `turns`: with the defines that depend on how formulas' turns repeat themselves.
         """
         chains = self._chains
-        own = {} if turns is None else turns(chains)
+        own = _turns(chains) if turns else {}
         lines = "".join(f"#define {name} {value}\n" for name, value in own.items())
         text = write_formula(self.chain).text if self.scene is None else write_together(chains).text
         return {"formula.h": lines + text}
@@ -78,6 +81,16 @@ class Body:
     @property
     def _chains(self) -> tuple[Chain, ...]:
         return (self.chain,) if self.scene is None else _chains(self.scene)
+
+
+def _turns(chains: Sequence[Chain]) -> dict[str, int]:
+    """What texts that look for orbits that came back depend on: one set for all formulas of a program."""
+    cycle = math.lcm(*(chain.cycle_length for chain in chains))
+    return {
+        "CHUNK": cycle * -(-_CHUNK // cycle),
+        "PERIOD_CHECK": cycle * max(1, _PERIOD_CHECK // cycle),
+        "REPEATS_FROM": max(chain.repeats_from for chain in chains),
+    }
 
 
 def joins_smoothly(scene: Scene) -> bool:

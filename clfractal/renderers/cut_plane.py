@@ -5,7 +5,7 @@ from __future__ import annotations
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.renderers.carried import carried_text
-from clfractal.renderers.escape_colors import escape_defines, escape_palette
+from clfractal.renderers.escape_colors import escape_palette
 from clfractal.renderers.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
 from clfractal.renderers.plan import Plan
@@ -32,7 +32,7 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
         "PALETTE_SIZE": PALETTE_SIZE,
     }
     generated = {
-        **body.texts(escape_defines),
+        **body.texts(turns=True),
         "structs.h": structs,
         "carried.h": carried_text(),
     }

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Field
-from clfractal.formulas.language import Chain
 from clfractal.scene.cut_plane import EscapeColors
 
 ESCAPE_COLORS = [
@@ -22,8 +20,6 @@ ESCAPE_COLORS = [
 ]
 
 CURVES = ("linear", "root", "log")
-# Applications between two looks for an orbit that came back: few cost time, many find it late.
-PERIOD_CHECK = 8
 
 
 def escape_colors_values(colors: EscapeColors, iterations: int) -> dict[str, object]:
@@ -49,10 +45,3 @@ def escape_palette(colors: EscapeColors) -> npt.NDArray[np.float32]:
     from clfractal.scene.palette import named_table
 
     return np.ascontiguousarray(named_table(colors.palette), np.float32)
-
-
-def escape_defines(chains: Sequence[Chain]) -> dict[str, object]:
-    """What the text of `kernels/escape.h` depends on."""
-    cycle = math.lcm(*(chain.cycle_length for chain in chains))
-    repeats = max(chain.repeats_from for chain in chains)
-    return {"PERIOD_CHECK": cycle * max(1, PERIOD_CHECK // cycle), "REPEATS_FROM": repeats}

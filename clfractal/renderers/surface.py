@@ -13,7 +13,6 @@ from clfractal.renderers import records
 from clfractal.renderers.carried import carried_text
 from clfractal.renderers.declarations import struct_text
 from clfractal.renderers.environment import packed_map
-from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.glass import glass_tables
 from clfractal.renderers.kernel import (
     OBJECT_NUMBERS,
@@ -52,7 +51,7 @@ from clfractal.renderers.waves import (
 )
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.solids import Body, Turns
+from clfractal.solids import Body
 
 PALETTE_SIZE = 256
 Floats = npt.NDArray[np.float32]
@@ -177,7 +176,7 @@ class _Program:
     kernels: tuple[str, ...]
     defines: Callable[[Scene, Plan], dict[str, object]]
     formula: bool = False
-    turns: Turns | None = None
+    turns: bool = False
 
 
 # A scene needs those whose stages it launches.
@@ -208,7 +207,7 @@ PROGRAMS = (
         ("find_faces", "find_planes"),
         state_defines,
         formula=True,
-        turns=escape_defines,
+        turns=True,
     ),
 )
 
@@ -236,7 +235,7 @@ def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list
         kernels = tuple(name for name in each.kernels if plan.lanes == 1 or name not in OF_SINGLE_LANES)
         generated = _structs()
         if each.formula:
-            generated = {**body.texts(each.turns), **generated}
+            generated = {**body.texts(turns=each.turns), **generated}
         flat = flat_text(each.entry, generated=generated, defines=defines(each.defines))
         texts.append(ProgramText(each.name, flat, kernels))
     return texts

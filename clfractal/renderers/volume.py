@@ -18,7 +18,6 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.renderers import records
 from clfractal.renderers.carried import carried_text
 from clfractal.renderers.environment import PackedEnvironment, packed_map
-from clfractal.renderers.escape_colors import escape_defines
 from clfractal.renderers.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
 from clfractal.renderers.kinds import kind_text
 from clfractal.renderers.passes import SAMPLING, pass_defines
@@ -131,7 +130,7 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
         "carried.h": carried_text(),
     }
     if asks_formula(scene):
-        generated |= Body.of(scene).texts(escape_defines)
+        generated |= Body.of(scene).texts(turns=True)
     return flat_text(f"{kernel_of(scene)}.cl", generated=generated, defines=defines)
 
 

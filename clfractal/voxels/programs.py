@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -18,7 +17,6 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
-from clfractal.formulas.language import Chain
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.solids import Body
 from clfractal.voxels.grid import Kind
@@ -43,8 +41,6 @@ BRICK_GROUP = (1, 16)
 # Where a work-item takes 9 places of a brick, one x and one y: 81 of them, in whole groups.
 ALONE_ITEMS, ALONE_GROUP = 96, (32, 1)
 NODE_POINTS = 64
-# Applications between two looks at a packet.
-CHUNK = 4
 # Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
 PACKETS = 2
 
@@ -147,7 +143,7 @@ def nodes_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
         "classify_nodes",
         _number_defines(lanes, precision),
         precision,
-        body.texts(_turns),
+        body.texts(turns=True),
         1,
         (1, max(NODE_POINTS // lanes, 1)),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
@@ -161,7 +157,7 @@ def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Pre
         *_FILLS[FILL_KINDS.index(renderer.value)],
         _number_defines(lanes, precision),
         precision,
-        body.texts(_turns),
+        body.texts(turns=True),
         items,
         (items, 1),
         (_BUFFER, _BUFFER, _INT, _BUFFER, _INT, _FLOAT, *[_BUFFER] * 4),
@@ -215,7 +211,7 @@ def normals_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
         "refine_normals",
         _number_defines(lanes, precision),
         precision,
-        body.texts(_turns),
+        body.texts(turns=True),
         1,
         (1, 1),
         (_BUFFER, _BUFFER, _INT, _INT, _INT, *[_BUFFER] * 4),
@@ -224,12 +220,6 @@ def normals_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
 
 def _number_defines(lanes: int, precision: Precision) -> dict[str, object]:
     return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
-
-
-def _turns(chains: Sequence[Chain]) -> dict[str, object]:
-    """How the turns of formulas repeat themselves."""
-    cycle = math.lcm(*(chain.cycle_length for chain in chains))
-    return {"CHUNK": cycle * -(-CHUNK // cycle), "REPEATS_FROM": max(chain.repeats_from for chain in chains)}
 
 
 def _sample_defines(sample: Kind) -> dict[str, object]:

@@ -55,7 +55,6 @@ kernels/march_steps.h: render/searches
 kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
 kernels/solids*: render/joined
 kernels/solid_inside.h: voxels/
-kernels/solid_count.h: voxels/
 kernels/node_proof.h: voxels/
 kernels/bricks.h: voxels/
 clfractal/solids.py: voxels/joined_voxels render/joined
