@@ -9,7 +9,7 @@ INLINE real cloud_number(grid_ray r, real value, int column) {
     const real at = place * (real)((scalar)(TRANSFER_SIZE - 1));
     const ints first = min(to_ints(at), (ints)(TRANSFER_SIZE - 2));
     const ints entry = CLOUD_COLUMNS * first + column;
-    return between_two(gather_floats(table, entry), gather_floats(table, entry + CLOUD_COLUMNS), at - to_reals(first));
+    return between(gather_floats(table, entry), gather_floats(table, entry + CLOUD_COLUMNS), at - to_reals(first));
 }
 
 // What `volume_track.h` asks of a ray through a grid.

@@ -110,38 +110,6 @@
     DIRECT_ROOT_OF_HALVES(double16)
 #endif
 
-// One of two numbers by the sign of a whole one as wide. For `m ? yes : no` clang makes three operations on bits in OpenCL, which its
-// optimiser does not always put together again.
-#define DIRECT_PICK(type, whole, expression) \
-    DIRECT type direct_pick(whole m, type yes, type no) { return expression; }
-#if defined(__AVX__) && __has_builtin(__builtin_ia32_blendvps256) && __has_builtin(__builtin_ia32_blendvps)
-DIRECT_PICK(float4, int4, __builtin_astype(__builtin_ia32_blendvps(no, yes, as_float4(m)), float4))
-DIRECT_PICK(float8, int8, __builtin_astype(__builtin_ia32_blendvps256(no, yes, as_float8(m)), float8))
-#if REAL_IS_DOUBLE
-DIRECT_PICK(double4, long4, __builtin_astype(__builtin_ia32_blendvpd256(no, yes, as_double4(m)), double4))
-#endif
-#else
-DIRECT_PICK(float4, int4, m ? yes : no)
-DIRECT_PICK(float8, int8, m ? yes : no)
-#if REAL_IS_DOUBLE
-DIRECT_PICK(double4, long4, m ? yes : no)
-#endif
-#endif
-#if defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_selectps_512) && __has_builtin(__builtin_ia32_cvtd2mask512)
-DIRECT_PICK(float16, int16, __builtin_astype(__builtin_ia32_selectps_512(__builtin_ia32_cvtd2mask512(m), yes, no), float16))
-#if REAL_IS_DOUBLE
-DIRECT_PICK(double8, long8, __builtin_astype(__builtin_ia32_selectpd_512(__builtin_ia32_cvtq2mask512(m), yes, no), double8))
-#endif
-#else
-DIRECT_PICK(float16, int16, m ? yes : no)
-#if REAL_IS_DOUBLE
-DIRECT_PICK(double8, long8, m ? yes : no)
-#endif
-#endif
-#if REAL_IS_DOUBLE
-DIRECT_PICK(double16, long16, m ? yes : no)
-#endif
-
 // For all widths.
 #define DIRECT_MEMORIES(type) DIRECT_MEMORY(type, 4) DIRECT_MEMORY(type, 8) DIRECT_MEMORY(type, 16)
 #define DIRECT_WHOLES(type) DIRECT_WHOLE(type) DIRECT_WHOLE(type##4) DIRECT_WHOLE(type##8) DIRECT_WHOLE(type##16)
@@ -221,31 +189,13 @@ DIRECT_ROOTS_OF_DOUBLES
 #define convert_uchar(a) ((uchar)(a))
 #define convert_uchar_sat(a) direct_uchar_sat(a)
 #if __has_builtin(__builtin_convertvector)
-#undef convert_uchar8
-#undef convert_int4
-#undef convert_int8
-#undef convert_int16
-#undef convert_long4
-#undef convert_long8
-#undef convert_long16
-#undef convert_float4
-#undef convert_float8
-#undef convert_float16
-#undef convert_double4
-#undef convert_double8
-#undef convert_double16
-#define convert_uchar8(a) __builtin_convertvector(a, uchar8)
-#define convert_int4(a) __builtin_convertvector(a, int4)
-#define convert_int8(a) __builtin_convertvector(a, int8)
-#define convert_int16(a) __builtin_convertvector(a, int16)
-#define convert_long4(a) __builtin_convertvector(a, long4)
-#define convert_long8(a) __builtin_convertvector(a, long8)
-#define convert_long16(a) __builtin_convertvector(a, long16)
-#define convert_float4(a) __builtin_convertvector(a, float4)
-#define convert_float8(a) __builtin_convertvector(a, float8)
-#define convert_float16(a) __builtin_convertvector(a, float16)
-#define convert_double4(a) __builtin_convertvector(a, double4)
-#define convert_double8(a) __builtin_convertvector(a, double8)
-#define convert_double16(a) __builtin_convertvector(a, double16)
+#define CONVERT(type, a) __builtin_convertvector(a, type)
 #endif
+#endif
+
+// The conversion of a vector to one of another type.
+#define JOIN_(a, b) a##b
+#define JOIN(a, b) JOIN_(a, b)
+#ifndef CONVERT
+#define CONVERT(type, a) JOIN(convert_, type)(a)
 #endif

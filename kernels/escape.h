@@ -4,17 +4,7 @@
 // REPEATS_FROM, the application from which on a chain's turns repeat themselves.
 
 // Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
-#if REAL_IS_DOUBLE
-#if LANES == 1
-#define same_bits(a, b) (-(as_long(a) == as_long(b)))
-#else
-#define same_bits(a, b) (JOIN(as_long, LANES)(a) == JOIN(as_long, LANES)(b))
-#endif
-#elif LANES == 1
-#define same_bits(a, b) (-(as_int(a) == as_int(b)))
-#else
-#define same_bits(a, b) (as_mask(a) == as_mask(b))
-#endif
+#define same_bits(a, b) equal_ints(as_whole(a), as_whole(b))
 
 typedef struct {
     real count;         // applications until |z| > bailout, whole or smooth; the limit for points that never get there

@@ -1,31 +1,18 @@
 // Loads from places that differ from lane to lane. Where the compiler generates x86 code directly, the instruction is named;
 // elsewhere lanes are loaded one after another.
+typedef mask ints;
 #if LANES == 1
 #define to_ints(a) ((int)(a))
-#define to_reals(a) ((real)(a))
 #define ints_load(array) ((array)[0])
 #define ints_store(value, array) ((array)[0] = (value))
 #define floats_load(array) ((array)[0])
-#elif REAL_IS_DOUBLE
-// As wide as masks; in memory these are ints and floats.
-#define to_ints(a) JOIN(convert_long, LANES)(a)
-#define to_reals(a) JOIN(convert_double, LANES)(a)
-#define ints_load(array) to_ints(JOIN(vload, LANES)(0, array))
-#define ints_store(value, array) JOIN(vstore, LANES)(JOIN(convert_int, LANES)(value), 0, array)
-#define floats_load(array) to_reals(JOIN(vload, LANES)(0, array))
-#else
-#define to_ints(a) JOIN(convert_int, LANES)(a)
-#define to_reals(a) JOIN(convert_float, LANES)(a)
-#define ints_load(array) JOIN(vload, LANES)(0, array)
-#define ints_store(value, array) JOIN(vstore, LANES)(value, 0, array)
-#define floats_load(array) JOIN(vload, LANES)(0, array)
-#endif
-typedef mask ints;
-#if LANES == 1
 #define pick_ints(m, yes, no) ((m) ? (yes) : (no))
-#define equal_ints(a, b) (-((a) == (b)))
 #else
-#define equal_ints(a, b) ((a) == (b))
+// With numbers of 64 bits as wide as masks; in memory these are ints and floats.
+#define to_ints(a) CONVERT(OF_LANES(INTEGER), a)
+#define ints_load(array) to_ints(JOIN(vload, LANES)(0, array))
+#define ints_store(value, array) JOIN(vstore, LANES)(CONVERT(OF_LANES(int), value), 0, array)
+#define floats_load(array) to_reals(JOIN(vload, LANES)(0, array))
 #define pick_ints(m, yes, no) ((m) ? (ints)(yes) : (ints)(no))
 #endif
 

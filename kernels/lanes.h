@@ -6,14 +6,16 @@
 //   R(1.5)   a literal of the right precision in every lane.
 #if REAL_IS_DOUBLE
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
-typedef double scalar;
+#define SCALAR double
+#define INTEGER long
 #define R(x) ((real)(x))
 #define S(x) (x)
 #define REAL_SMALLEST 2.2250738585072014e-308
 #define REAL_LARGEST 1.7976931348623157e308
 #define REAL_EPSILON 2.220446049250313e-16
 #else
-typedef float scalar;
+#define SCALAR float
+#define INTEGER int
 #define R(x) ((real)(x##f))
 #define S(x) (x##f)
 #define REAL_SMALLEST 1.17549435e-38f
@@ -23,39 +25,29 @@ typedef float scalar;
 
 #include "direct.h"
 
-#if REAL_IS_DOUBLE
-#define NUMBERS_4 double4
-#define NUMBERS_8 double8
+// The type of a number of each lane.
+#if LANES == 1
+#define OF_LANES(type) type
 #else
-#define NUMBERS_4 float4
-#define NUMBERS_8 float8
+#define OF_LANES(type) JOIN(type, LANES)
 #endif
-
-#define JOIN_(a, b) a##b
-#define JOIN(a, b) JOIN_(a, b)
+typedef SCALAR scalar;
+typedef OF_LANES(SCALAR) real;
 
 #if LANES == 1
-typedef scalar real;
 typedef int mask;
 #define any_lane(m) ((m) != 0)
-#define as_mask(a) as_int(a)  // of float: the bits, as whole numbers
-#define as_real(a) as_float(a)
-#define real_of_mask(a) ((scalar)(a))
 #define less(a, b) (-((a) < (b)))
 #define less_equal(a, b) (-((a) <= (b)))
 #define equal(a, b) (-((a) == (b)))
+#define equal_ints(a, b) equal(a, b)
 #define is_nan(a) (-((a) != (a)))
 #define pick(m, yes, no) ((m) ? (yes) : (no))
+#define to_reals(a) ((real)(a))
 #define lanes_store(value, array) ((array)[0] = (value))
 #define lanes_load(array) ((array)[0])
 #else
-#if REAL_IS_DOUBLE
-typedef JOIN(double, LANES) real;
-typedef JOIN(long, LANES) mask;
-#else
-typedef JOIN(float, LANES) real;
-typedef JOIN(int, LANES) mask;
-#endif
+typedef OF_LANES(INTEGER) mask;
 // PoCL's `any` tests lane after lane; a reduction becomes one or two instructions.
 #if defined(__has_builtin) && !defined(INTERPRETED)
 #if __has_builtin(__builtin_reduce_or)
@@ -65,21 +57,40 @@ typedef JOIN(int, LANES) mask;
 #ifndef any_lane
 #define any_lane(m) any(m)
 #endif
-#define as_mask(a) JOIN(as_int, LANES)(a)
-#define as_real(a) JOIN(as_float, LANES)(a)
-#define real_of_mask(a) JOIN(convert_float, LANES)(a)
 #define less(a, b) ((real)(a) < (real)(b))
 #define less_equal(a, b) ((real)(a) <= (real)(b))
 #define equal(a, b) ((real)(a) == (real)(b))
+#define equal_ints(a, b) ((a) == (b))
 #define is_nan(a) ((a) != (a))
 #ifdef DIRECT_BUILT_INS
+// One of two numbers by the sign of a whole one as wide. For `m ? yes : no` clang makes three operations on bits in OpenCL, which its
+// optimiser does not always put together again.
+INLINE real direct_pick(mask m, real yes, real no) {
+#if LANES == 4 && !REAL_IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_blendvps)
+    return __builtin_astype(__builtin_ia32_blendvps(no, yes, as_float4(m)), real);
+#elif LANES == 8 && !REAL_IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_blendvps256)
+    return __builtin_astype(__builtin_ia32_blendvps256(no, yes, as_float8(m)), real);
+#elif LANES == 4 && REAL_IS_DOUBLE && defined(__AVX__) && __has_builtin(__builtin_ia32_blendvpd256)
+    return __builtin_astype(__builtin_ia32_blendvpd256(no, yes, as_double4(m)), real);
+#elif LANES == 16 && !REAL_IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_selectps_512)
+    return __builtin_astype(__builtin_ia32_selectps_512(__builtin_ia32_cvtd2mask512(m), yes, no), real);
+#elif LANES == 8 && REAL_IS_DOUBLE && defined(__AVX512DQ__) && __has_builtin(__builtin_ia32_selectpd_512)
+    return __builtin_astype(__builtin_ia32_selectpd_512(__builtin_ia32_cvtq2mask512(m), yes, no), real);
+#else
+    return m ? yes : no;
+#endif
+}
 #define pick(m, yes, no) direct_pick(m, (real)(yes), (real)(no))
 #else
 #define pick(m, yes, no) ((m) ? (real)(yes) : (real)(no))
 #endif
+#define to_reals(a) CONVERT(OF_LANES(SCALAR), a)
 #define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
 #endif
+// The bits of numbers as whole ones, and back.
+#define as_whole(a) JOIN(as_, OF_LANES(INTEGER))(a)
+#define as_real(a) JOIN(as_, OF_LANES(SCALAR))(a)
 
 // The smaller and the larger one, where neither is NaN: as one instruction, which fmin and fmax are not.
 #define least(a, b) pick(less(a, b), a, b)
@@ -120,12 +131,12 @@ INLINE scalar lanes_sum(real value) {
     return value;
 #else
 #if LANES == 16
-    const NUMBERS_8 eight = value.lo + value.hi;
+    const JOIN(SCALAR, 8) eight = value.lo + value.hi;
 #elif LANES == 8
     const real eight = value;
 #endif
 #if LANES >= 8
-    const NUMBERS_4 four = eight.lo + eight.hi;
+    const JOIN(SCALAR, 4) four = eight.lo + eight.hi;
 #else
     const real four = value;
 #endif

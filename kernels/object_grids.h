@@ -85,8 +85,6 @@ INLINE void grid_corners(grid_cell c, object_record o, __global const float *tab
     }
 }
 
-INLINE real between_two(real a, real b, real share) { return a + (b - a) * share; }
-
 // The value at a place.
 INLINE real grid_value(vec p, object_record o, __global const float *tables) {
     real v[8];

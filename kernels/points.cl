@@ -9,7 +9,7 @@ INLINE vec load_point(__global const scalar *points, int stride, int first) {
 INLINE void store_whole(__global int *result, int first, mask value) {
     int each[LANES];
 #if REAL_IS_DOUBLE && LANES > 1
-    lanes_store(JOIN(convert_int, LANES)(value), each);
+    lanes_store(CONVERT(OF_LANES(int), value), each);
 #else
     lanes_store(value, each);
 #endif

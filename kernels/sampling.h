@@ -4,23 +4,9 @@
 // the pixel's place in the picture and of the purpose, so that neither tiles nor the order of work change a picture.
 
 // 32 random bits per lane.
-#if LANES == 1
-typedef uint bits;
-#define bits_load(array) ((uint)((array)[0]))
-#if REAL_IS_DOUBLE
-#define real_of_bits(a) convert_double(as_int(a))  // of a < 2^31
-#else
-#define real_of_bits(a) convert_float(as_int(a))
-#endif
-#else
-typedef JOIN(uint, LANES) bits;
-#define bits_load(array) JOIN(as_uint, LANES)(lanes_load(array))
-#if REAL_IS_DOUBLE
-#define real_of_bits(a) JOIN(convert_double, LANES)(JOIN(as_int, LANES)(a))
-#else
-#define real_of_bits(a) JOIN(convert_float, LANES)(JOIN(as_int, LANES)(a))
-#endif
-#endif
+typedef OF_LANES(uint) bits;
+#define bits_load(array) JOIN(as_, OF_LANES(uint))(lanes_load(array))
+#define real_of_bits(a) to_reals(JOIN(as_, OF_LANES(int))(a))  // of a < 2^31
 
 // Purposes: independent sequences of the same pixel. Lights are numbered from PURPOSE_LIGHT on.
 enum {

@@ -11,7 +11,7 @@ typedef float16 wide;
 typedef int16 wide_int;
 typedef uint16 wide_uint;
 #define LINES BRICK_SIDE
-#define WHOLE(a) as_uint16(convert_int16(a))
+#define WHOLE(a) as_uint16(CONVERT(int16, a))
 #endif
 
 // The place of a brick, and where its voxels are.

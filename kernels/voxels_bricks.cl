@@ -83,7 +83,7 @@ INLINE void store_values(__global uchar *values, size_t at, int floats, wide row
         vstore8(row.lo, 0, to_floats);
         to_floats[8] = row.s8;
     } else {
-        vstore8(convert_uchar8(row.lo), 0, to_bytes);
+        vstore8(CONVERT(uchar8, row.lo), 0, to_bytes);
         to_bytes[8] = convert_uchar(row.s8);
     }
 #endif

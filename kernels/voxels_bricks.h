@@ -95,7 +95,7 @@ INLINE row row_at(const neighbourhood *n, int y, int z) { return n->rows[(z + VO
 // Voxels `offset` to `offset` + 15 of the row; those past the neighbourhood are 0.
 INLINE float16 row_window(const row *r, int offset) {
     const uint16 shift = (uint16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15) + (uint)(offset + VOXELS_BEFORE);
-    return convert_float16(convert_int16(((uint16)(*r) >> shift) & 1u));
+    return CONVERT(float16, CONVERT(int16, ((uint16)(*r) >> shift) & 1u));
 }
 #else
 // Voxel x of the row is entry x + VOXELS_BEFORE.
@@ -123,7 +123,7 @@ INLINE int row_of(const near_bricks *around, int y, int z, __constant const stru
 // Four voxels of a brick, or of none.
 INLINE float4 four_voxels(__global const SAMPLE *samples, int number, int place, __constant const struct Extent *extent) {
     if (number < 0) return (float4)(number == ALL_INSIDE ? extent->whole : 0.0f);
-    return convert_float4(vload4(0, samples + (size_t)number * 512 + place));
+    return CONVERT(float4, vload4(0, samples + (size_t)number * 512 + place));
 }
 
 INLINE row row_at(const neighbourhood *n, int y, int z) {
@@ -159,7 +159,7 @@ INLINE row row_at(const neighbourhood *n, int y, int z) {
     const size_t start = ((size_t)row_z * (extent->last[1] + 1) + row_y) * (extent->last[0] + 1);
     const int first = BRICK * n->around->x - VOXELS_BEFORE;
 #if RADIUS <= 2
-    if (first >= 0 && first + 15 <= extent->last[0]) return convert_float16(vload16(0, n->samples + start + first));
+    if (first >= 0 && first + 15 <= extent->last[0]) return CONVERT(float16, vload16(0, n->samples + start + first));
 #endif
     float each[40];
     for (int i = 0; i < 40; ++i) {

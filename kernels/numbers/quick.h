@@ -7,8 +7,8 @@ INLINE real quick_log2(real a) {
 #if REAL_IS_DOUBLE
     return log2(a);
 #else
-    const mask bits = as_mask(a) - 0x3f3504f3;  // the bits of 1/sqrt 2
-    const real exponent = real_of_mask(bits >> 23);
+    const mask bits = as_whole(a) - 0x3f3504f3;  // the bits of 1/sqrt 2
+    const real exponent = to_reals(bits >> 23);
     const real m = as_real((bits & 0x007fffff) + 0x3f3504f3);
     const real s = (m - R(1.0)) / (m + R(1.0));
     const real s2 = s * s;
@@ -25,6 +25,6 @@ INLINE real quick_exp2(real a) {
     const real whole = floor(within), part = within - whole;
     const real mantissa = R(1.0) + part * (R(0.6931530) + part * (R(0.2401475) + part * (R(0.0558534) + part * (R(0.0089505) +
                           part * R(0.0018956)))));
-    return mantissa * as_real((as_mask(whole + R(12582912.0)) - (0x4b400000 - 127)) << 23);  // 1.5 * 2^23 makes it whole
+    return mantissa * as_real((as_whole(whole + R(12582912.0)) - (0x4b400000 - 127)) << 23);  // 1.5 * 2^23 makes it whole
 #endif
 }

@@ -47,10 +47,7 @@ _SMALL = re.compile(
 # Those that stand in parts of a text that packets on a processor do not take.
 _ELSEWHERE = {
     "any": "where the compiler has no reduction",
-    "convert_float": "of single lanes",
-    "convert_double": "of single lanes",
-    "convert_int": "completed by JOIN",
-    "convert_long": "completed by JOIN",
+    "convert_int": "of single lanes",
 }
 
 Build = Callable[[str, programs.Recipe], None]
@@ -167,6 +164,6 @@ def test_the_texts_name_nothing_small_that_is_no_operation(rendered: Path) -> No
         assert "direct_fmax" in text
         code = re.sub(r"//[^\n]*", "", text.replace(direct, ""))
         named = set(_SMALL.findall(code)) - set(_ELSEWHERE)
-        # `JOIN(vload, LANES)` makes vload8, `JOIN(convert_float, LANES)` convert_float8.
+        # `JOIN(vload, LANES)` makes vload8.
         named = {f"{name}8" if name in ("vload", "vstore") else name for name in named}
         assert named <= defined
