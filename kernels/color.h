@@ -1,25 +1,14 @@
-// Colours, linear Rec. 709, and palettes.
-typedef struct {
-    real r, g, b;
-} color;
-
-INLINE color color_of(real r, real g, real b) { return (color){r, g, b}; }
+// Colours and palettes.
 #define color_splat(c) color_of((real)((c)[0]), (real)((c)[1]), (real)((c)[2]))  // of a struct in any memory
-INLINE color color_pick(mask m, color yes, color no) {
-    return color_of(pick(m, yes.r, no.r), pick(m, yes.g, no.g), pick(m, yes.b, no.b));
-}
 INLINE color color_mix(color a, color b, real share) {
     return color_of(a.r + (b.r - a.r) * share, a.g + (b.g - a.g) * share, a.b + (b.b - a.b) * share);
 }
-INLINE color color_add(color a, color b) { return color_of(a.r + b.r, a.g + b.g, a.b + b.b); }
-INLINE color color_mul(color a, color b) { return color_of(a.r * b.r, a.g * b.g, a.b * b.b); }
-INLINE color color_scale(color a, real s) { return color_of(a.r * s, a.g * s, a.b * s); }
 INLINE real brightest(color c) { return fmax(fmax(c.r, c.g), c.b); }
 
 // A colour whose brightest component is at most the limit: one sample must not outshine all others of its pixel.
 INLINE color color_limited(color c, real limit) {
-    const real brightest = fmax(fmax(c.r, c.g), c.b);
-    return color_scale(c, pick(less(limit, brightest), limit / brightest, R(1.0)));
+    const real most_of_it = brightest(c);
+    return color_scale(c, pick(less(limit, most_of_it), limit / most_of_it, R(1.0)));
 }
 
 // Where a quantity lies in the palette, 0 to 1, at scale * quantity + offset: the palette repeats, or its ends go on.

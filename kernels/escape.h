@@ -74,9 +74,9 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
         limit = most + (orbit->longest - orbit->iterations);
     }
     const orbit_end last = {count, inside};
-    const surface_point surface = {.square = square, .square_before = square_before};
-    const real told = smooth ? formula_smooth_count(last, surface, orbit) : count;
-    return (escaped){pick(inside, (real)((scalar)most), told), inside, count};
+    const orbit_told told = {.square = square, .square_before = square_before};
+    const real found = smooth ? formula_smooth_count(last, told, orbit) : count;
+    return (escaped){pick(inside, (real)((scalar)most), found), inside, count};
 }
 
 CALLED void other_escape(const vec *point, const mask *active, int smooth, int periodicity, int most, escaped *found,

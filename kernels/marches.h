@@ -1,14 +1,22 @@
-// What texts that march rays of a queue say behind their search.
+// What texts that march rays of a queue say behind their search: what the kernels of a search do. `known`: whether something may be
+// known of rays. A share is marched, and the surfaces that it meets are looked at; single lanes look in a kernel of its own.
 #include "queue.h"
 #include "share.h"
 #include "arguments.h"
 #include "surface_at.h"
 
-// Marches a share, and looks at the surfaces that it meets; `waiting` counts the steps that lanes have waited.
-INLINE void march_and_look(share mine, queue q, int goal, __global uint *waiting, march_record settings,
-                           orbit_record orbit, constants k) {
-    const int waits = march_share(mine, q, goal, settings, orbit, k);
-    look_at_share(mine, q, goal, settings, orbit, k);
-    // Nobody counts those of the cones.
-    if (LANES > 1 && goal != GOAL_CONE) atomic_add(waiting, (uint)waits);
-}
+// Nobody counts the steps that lanes of cones have waited.
+#define MARCHES_SHARES(known)                                                                             \
+    {                                                                                                     \
+        const queue q = MARCH_QUEUE(known);                                                               \
+        const share mine = share_of_item(ITEM, slice, q);                                                 \
+        if (mine.next >= mine.end || WAS_CANCELLED) return;                                               \
+        const int waits = march_share(mine, q, goal, settings, orbit, k);                                 \
+        look_at_share(mine, q, goal, settings, orbit, k);                                                 \
+        if (LANES > 1 && goal != GOAL_CONE) atomic_add(STATISTICS_HERE + STATISTIC_WAITS, (uint)waits);   \
+    }
+#define LOOKS_AT_SURFACES(known)                                                                          \
+    {                                                                                                     \
+        const queue q = MARCH_QUEUE(known);                                                               \
+        if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k);              \
+    }

@@ -34,17 +34,23 @@ typedef struct {
 // Where a distance is not known.
 INLINE mask is_blind(clearance here) { return JOINED ? less(here.step, here.most) : less(R(1.0), R(0.0)); }
 
-// What is known of a point on the surface, from one orbit over dual numbers.
+// What the orbit of a point on a surface tells.
 typedef struct {
-    vec gradient;        // of the distance or the surface, not normalised: points away from the solid
     real square;         // the last |z|^2 ...
     real square_before;  // ... and the one before it
     // Of several solids:
     real count;          // the count of the nearest one ...
     real of;             // ... its number ...
     real solid;          // ... and that of what the surface belongs to: the same, or what has cut it
-    real share;          // where two solids flow together: the other one's part of the colour ...
-    real other_square, other_square_before, other_count, other_of, other_solid;  // ... and the same of that one
+} orbit_told;
+
+// What is known of a point on the surface, from one orbit over dual numbers.
+typedef struct {
+    vec gradient;        // of the distance or the surface, not normalised: points away from the solid
+    orbit_told own;
+    // Of several solids, where two of them flow together: the other one's part of the colour, and what is known of that one.
+    real share;
+    orbit_told other;
 } surface_point;
 
 // Whose gradient is asked for: the distance's, of the last z; or that of the surface which is shown.

@@ -38,6 +38,6 @@ __kernel void distances(__global const scalar *points, __global scalar *result, 
     const clearance full = orbit_dual_distance(point, all_lanes, OF_SURFACE, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
     const real found[8] = {near.step, full.step, normal.x, normal.y, normal.z, smooth_count(full.end, surface, orbit),
-                           pick(full.end.inside, R(1.0), R(0.0)), JOINED ? surface.solid : R(0.0)};
+                           pick(full.end.inside, R(1.0), R(0.0)), JOINED ? surface.own.solid : R(0.0)};
     for (int i = 0; i < (JOINED ? 8 : 7); ++i) lanes_store(found[i], result + i * stride + first);
 }

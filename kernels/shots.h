@@ -94,47 +94,32 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
     return result;
 }
 
-// The sums of layers before this sample; see `sums_before`.
-INLINE parts parts_before(stage s, const place_in_pass *here) {
-    parts sum = {0};
-    if (s.sample > s.span.first) {
-        STATE_RECALL(s, sum, STATE_PARTS);
-    } else if (s.span.first > 0) {
-        kept_parts(here->kept, s.span.slots + CHANNEL_COUNT, 0, &sum);
-    }
-    return sum;
-}
+// The sums of layers, or of the things that pixels show, are kept and written as those of `sums_before` are.
+#define SUMS_BEFORE(s, here, type, sum, part, numbers)                                                             \
+    type sum = {0};                                                                                             \
+    if ((s).sample > (s).span.first) STATE_RECALL(s, sum, part);                                                \
+    else if ((s).span.first > 0) numbers((here)->kept, (s).span.slots + CHANNEL_COUNT, 0, &sum)
+#define SUMS_AFTER(s, here, sum, shots, part, numbers, write)                                                      \
+    if ((s).sample + 1 < (s).span.end) {                                                                        \
+        STATE_KEEP(s, sum, part);                                                                               \
+        return;                                                                                                 \
+    }                                                                                                           \
+    __global float *tile_ = (s).span.film + (here)->tile * (s).span.channel_count * TILE_PIXELS;                \
+    write(tile_, (s).span.slots, (here)->at.place, &sum, shots);                                                \
+    if ((s).span.mode & PASS_KEEP) numbers((here)->kept, (s).span.slots + CHANNEL_COUNT, 1, &sum)
 
-// Adds the shots' layers to their pixels' sums, which are kept or written as those are.
+// Adds the shots' layers to their pixels' sums.
 INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wanted, real shots) {
-    parts sum = parts_before(s, here);
+    SUMS_BEFORE(s, here, parts, sum, STATE_PARTS, kept_parts);
     parts_add(&sum, more, wanted);
-    if (s.sample + 1 < s.span.end) {
-        STATE_KEEP(s, sum, STATE_PARTS);
-        return;
-    }
-    const pass span = s.span;
-    parts_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
-    if (span.mode & PASS_KEEP) kept_parts(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
+    SUMS_AFTER(s, here, sum, shots, STATE_PARTS, kept_parts, parts_write);
 }
 
 // Likewise which things they show; `sums` are those before.
 INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, shot found, mask wanted, real offset) {
-    mattes sum = {{0}};
-    if (s.sample > s.span.first) {
-        STATE_RECALL(s, sum, STATE_MATTES);
-    } else if (s.span.first > 0) {
-        kept_mattes(here->kept, s.span.slots + CHANNEL_COUNT, 0, &sum);
-    }
+    SUMS_BEFORE(s, here, mattes, sum, STATE_MATTES, kept_mattes);
     mattes_add(&sum, found.thing, found.covers, wanted, wanted & less(offset, sums->nearest));
-    if (s.sample + 1 < s.span.end) {
-        STATE_KEEP(s, sum, STATE_MATTES);
-        return;
-    }
-    const pass span = s.span;
-    const real shots = sums->shots + number_of(wanted);
-    mattes_write(span.film + here->tile * span.channel_count * TILE_PIXELS, span.slots, here->at.place, &sum, shots);
-    if (span.mode & PASS_KEEP) kept_mattes(here->kept, span.slots + CHANNEL_COUNT, 1, &sum);
+    SUMS_AFTER(s, here, sum, sums->shots + number_of(wanted), STATE_MATTES, kept_mattes, mattes_write);
 }
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.

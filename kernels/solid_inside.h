@@ -11,7 +11,7 @@ INLINE real apart_square(state z, state past) {
     return state_square(apart);
 }
 
-// Which points belong to the solid: as `formula_inside` at the iteration limit, in fewer operations. An orbit that comes back to
+// Which points belong to the solid: as `formula_end` at the iteration limit, in fewer operations. An orbit that comes back to
 // the very same z never escapes (Brent 1980, "An improved Monte Carlo factorization algorithm", sec. 2: compare with a z that is
 // renewed at powers of two). Packets are tested every few applications, and lanes that escaped continue without effect. One
 // lane ends at once, and has neither arrays nor loops of a constant count (see TURNS in lanes.h).
@@ -111,7 +111,7 @@ INLINE void formula_all_inside(const vec *points, mask *inside, orbit_record orb
         return;
     }
     const mask all_lanes = equal(R(0.0), R(0.0));
-    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = formula_inside(points[p], all_lanes, orbit->iterations, orbit, k);
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = formula_end(points[p], all_lanes, orbit->iterations, orbit, k).inside;
 }
 
 // As `solids_inside`: a formula is asked only where its ball is near.

@@ -7,24 +7,6 @@
 // two bounds, that are folded as distances are: it is at least that to what was cut, and may be any.
 NUMBERS_PICKED(surface_point)
 
-// What is known of a surface as that of the other one.
-INLINE void surface_beside(surface_point *surface, surface_point other) {
-    surface->other_square = other.square;
-    surface->other_square_before = other.square_before;
-    surface->other_count = other.count;
-    surface->other_of = other.of;
-    surface->other_solid = other.solid;
-}
-
-INLINE surface_point surface_of_other(surface_point surface) {
-    surface.square = surface.other_square;
-    surface.square_before = surface.other_square_before;
-    surface.count = surface.other_count;
-    surface.of = surface.other_of;
-    surface.solid = surface.other_solid;
-    return surface;
-}
-
 // A number between those of both, as far as each has one.
 INLINE real shared(real own, real other, mask own_told, mask other_told, real share) {
     return pick(own_told & other_told, own + share * (other - own), pick(other_told, other, own));
@@ -36,8 +18,8 @@ INLINE surface_point surface_flowing(surface_point all, surface_point more, mask
     const real of_all = R(1.0) - of_more, first = of_all * (R(1.0) - all.share), second = of_all * all.share;
     const mask stays = ~closer & less(of_more, second);
     surface_point found = surface_point_pick(closer, more, all), beside = all;
-    surface_beside(&beside, more);
-    surface_beside(&found, all);
+    beside.other = more.own;
+    found.other = all.own;
     found = surface_point_pick(closer, found, surface_point_pick(stays, all, beside));
     found.share = pick(stays, all.share, pick(closer, first, of_more) / (first + of_more));
     return found;
@@ -84,14 +66,12 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
         const mask counts = less(all->apart, more.apart + wall);
         // The wall of a simple solid is a part of what it cuts: its orbits are that formula's.
         if (o->kind != SOLID_FORMULA) {
-            more.surface.square = all->surface.square;
-            more.surface.square_before = all->surface.square_before;
-            more.surface.count = all->surface.count;
-            more.surface.of = all->surface.of;
             // It has a colour of its own, but the counts of both that flow together there.
+            const real wall_of = more.surface.own.solid;
+            more.surface.own = all->surface.own;
             more.surface.share = all->surface.share;
-            surface_beside(&more.surface, surface_of_other(all->surface));
-            more.surface.other_solid = more.surface.solid;
+            more.surface.other = all->surface.other;
+            more.surface.own.solid = more.surface.other.solid = wall_of;
         }
         all->surface = surface_point_pick(counts, more.surface, all->surface);
         all->scale = pick(counts, more.scale, all->scale);

@@ -56,7 +56,7 @@ INLINE solid_found solid_ask(orbit_record o, vec point, mask active, int asks, r
     found.far = pick(within, estimate, found.far);
     found.near = pick(within, estimate, found.near);
     found.inside = within & here.end.inside;
-    found.surface.count = here.end.count;
+    found.surface.own.count = here.end.count;
     *cost += pick(near, here.end.count, R(0.0));
     if (HAS_DERIVATIVE && !ASKS_GRADIENT(asks)) return found;
     // Where the ball cuts the set, the surface is the ball's.
@@ -68,8 +68,8 @@ INLINE solid_found solid_ask(orbit_record o, vec point, mask active, int asks, r
         found.near = found.apart = found.far;
         found.surface.gradient = vec_pick(found.inside, vec_of(R(0.0), R(0.0), R(0.0)), found.surface.gradient);
     }
-    found.surface.square = there.square;
-    found.surface.square_before = there.square_before;
+    found.surface.own.square = there.own.square;
+    found.surface.own.square_before = there.own.square_before;
     return found;
 }
 
@@ -84,8 +84,8 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, orbit_
         solid_found one = solid_ask(o, *point, active, asks, &cost, k);
         one.most = one.far;
         one.scale = (real)(o->step_scale);
-        one.surface.of = (real)((scalar)i);
-        one.surface.solid = (real)((scalar)o->object);
+        one.surface.own.of = (real)((scalar)i);
+        one.surface.own.solid = (real)((scalar)o->object);
         if (i == 0) all = one;
         else solid_join(o, &all, one, rounding);
     }
@@ -174,15 +174,15 @@ INLINE mask orbit_inside(vec point, mask active, int limit, orbit_record orbit, 
 }
 
 // The smooth escape count of one formula; 0 of a simple solid. `told`: of which lanes there is one.
-INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, orbit_record orbit) {
+INLINE real smooth_of_one(orbit_end end, orbit_told one, mask *told, orbit_record orbit) {
     real smooth = R(0.0);
-    end.count = surface.count;
+    end.count = one.count;
     *told = end.inside & ~end.inside;
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
-        const mask here = equal(surface.of, (real)((scalar)i));
+        const mask here = equal(one.of, (real)((scalar)i));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
-        smooth = pick(here, formula_smooth_count(end, surface, o), smooth);
+        smooth = pick(here, formula_smooth_count(end, one, o), smooth);
         *told |= here;
     }
     return smooth;
@@ -190,26 +190,26 @@ INLINE real smooth_of_one(orbit_end end, surface_point surface, mask *told, orbi
 
 // The smooth escape count of the formula that is nearest; where two flow together, between theirs.
 INLINE real smooth_count(orbit_end end, surface_point surface, orbit_record orbit) {
-    if (!JOINED) return formula_smooth_count(end, surface, orbit);
+    if (!JOINED) return formula_smooth_count(end, surface.own, orbit);
     mask told;
-    const real own = smooth_of_one(end, surface, &told, orbit);
+    const real own = smooth_of_one(end, surface.own, &told, orbit);
     const mask flows = less(R(0.0), surface.share);
     if (!any_lane(flows)) return own;
     mask other_told;
-    const real other = smooth_of_one(end, surface_of_other(surface), &other_told, orbit);
+    const real other = smooth_of_one(end, surface.other, &other_told, orbit);
     return shared(own, other, flows & told, flows & other_told, surface.share);
 }
 
 // The potential of the formula that is nearest, as if its ball were as large as the whole scene's; 0 on walls.
 INLINE real potential(orbit_end end, surface_point surface, orbit_record orbit) {
-    if (!JOINED) return formula_potential(end, surface, orbit);
+    if (!JOINED) return formula_potential(end, surface.own, orbit);
     real all = R(0.0);
-    end.count = surface.count;
+    end.count = surface.own.count;
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
-        const mask here = equal(surface.of, (real)((scalar)i)) & equal(surface.solid, (real)((scalar)o->object));
+        const mask here = equal(surface.own.of, (real)((scalar)i)) & equal(surface.own.solid, (real)((scalar)o->object));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
-        all = pick(here, formula_potential(end, surface, o) * (real)(o->potential_share), all);
+        all = pick(here, formula_potential(end, surface.own, o) * (real)(o->potential_share), all);
     }
     return all;
 }

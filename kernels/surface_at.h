@@ -138,8 +138,8 @@ INLINE void surface_at(ray r, encounter *met, mask active, int polished, march_r
     met->normal = vec_pick(less(R(0.1), away), vec_along(normal, R(-2.0) * away, r.direction), normal);
     met->smooth = smooth_count(there.end, surface, orbit);
     if (!JOINED) return;
-    met->solid = surface.solid;
-    met->other = surface.other_solid;
+    met->solid = surface.own.solid;
+    met->other = surface.other.solid;
     met->part = surface.share;
 }
 

@@ -42,8 +42,8 @@ INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, co
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
         const real number = (real)((scalar)i);
-        const mask here = active & equal(nearest.of, number);
-        const mask beside = active & less(R(0.0), nearest.share) & equal(nearest.other_of, number);
+        const mask here = active & equal(nearest.own.of, number);
+        const mask beside = active & less(R(0.0), nearest.share) & equal(nearest.other.of, number);
         if (o->kind != SOLID_FORMULA || !any_lane(here | beside)) continue;
         const real one = formula_near(near, solid_own(o, point), here | beside, o, k + o->first);
         found = pick(here, one, found);

@@ -1,9 +1,18 @@
-// Points and directions in scene units, one per lane.
-typedef struct {
-    real x, y, z;
-} vec;
+// Three numbers for each lane, and what is done with each alike: TYPE_of, TYPE_add, TYPE_mul, TYPE_scale, TYPE_pick.
+#define THREE_NUMBERS(type, x, y, z)                                                                                        \
+    typedef struct {                                                                                                        \
+        real x, y, z;                                                                                                       \
+    } type;                                                                                                                 \
+    INLINE type type##_of(real a, real b, real c) { return (type){a, b, c}; }                                               \
+    INLINE type type##_add(type a, type b) { return type##_of(a.x + b.x, a.y + b.y, a.z + b.z); }                           \
+    INLINE type type##_mul(type a, type b) { return type##_of(a.x * b.x, a.y * b.y, a.z * b.z); }                           \
+    INLINE type type##_scale(type a, real s) { return type##_of(a.x * s, a.y * s, a.z * s); }                               \
+    INLINE type type##_pick(mask m, type a, type b) { return type##_of(pick(m, a.x, b.x), pick(m, a.y, b.y), pick(m, a.z, b.z)); }
 
-INLINE vec vec_of(real x, real y, real z) { return (vec){x, y, z}; }
+// Points and directions in scene units, and colours, linear Rec. 709.
+THREE_NUMBERS(vec, x, y, z)
+THREE_NUMBERS(color, r, g, b)
+
 // Three numbers of a struct, the same for all lanes. A macro, as they may lie in any memory.
 #define vec_splat(a) vec_of((real)((a)[0]), (real)((a)[1]), (real)((a)[2]))
 #define vec_of_counts(a) vec_of((real)((scalar)(a)[0]), (real)((scalar)(a)[1]), (real)((scalar)(a)[2]))
@@ -12,18 +21,14 @@ INLINE vec vec_of(real x, real y, real z) { return (vec){x, y, z}; }
 #define vec_along_axes(o, a) vec_of(vec_dot(a, own_axis(o, x)), vec_dot(a, own_axis(o, y)), vec_dot(a, own_axis(o, z)))
 #define vec_of_axes(o, a) \
     vec_add(vec_add(vec_scale(own_axis(o, x), (a).x), vec_scale(own_axis(o, y), (a).y)), vec_scale(own_axis(o, z), (a).z))
-INLINE vec vec_add(vec a, vec b) { return vec_of(a.x + b.x, a.y + b.y, a.z + b.z); }
 INLINE vec vec_sub(vec a, vec b) { return vec_of(a.x - b.x, a.y - b.y, a.z - b.z); }
-INLINE vec vec_mul(vec a, vec b) { return vec_of(a.x * b.x, a.y * b.y, a.z * b.z); }
 INLINE vec vec_over(vec a, vec b) { return vec_of(a.x / b.x, a.y / b.y, a.z / b.z); }
-INLINE vec vec_scale(vec a, real s) { return vec_of(a.x * s, a.y * s, a.z * s); }
 // The point `distance` along a direction.
 INLINE vec vec_along(vec from, real distance, vec direction) {
     return vec_of(from.x + distance * direction.x, from.y + distance * direction.y, from.z + distance * direction.z);
 }
 INLINE real vec_dot(vec a, vec b) { return a.x * b.x + a.y * b.y + a.z * b.z; }
 INLINE vec vec_cross(vec a, vec b) { return vec_of(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x); }
-INLINE vec vec_pick(mask m, vec yes, vec no) { return vec_of(pick(m, yes.x, no.x), pick(m, yes.y, no.y), pick(m, yes.z, no.z)); }
 
 // Of three numbers for each lane, and as these.
 #define vec_load(a) vec_of(lanes_load((a)[0]), lanes_load((a)[1]), lanes_load((a)[2]))

@@ -2,17 +2,7 @@
 //
 // A ray looks at the grid at places that lie a fixed step apart, counted from where it enters the grid: skipping empty nodes
 // leaves out places, and never moves them.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/dual.h"
-#include "vectors.h"
-#include "structs.h"
-#include "camera.h"
-#include "sampling.h"
-#include "shade.h"
-#include "tiles.h"
-#include "pixel.h"
-#include "planes.h"
+#include "pictures.h"
 #include "grid.h"
 #include "volume_ray.h"
 

@@ -26,14 +26,5 @@ INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until)
     return pick(stored & active, gather_floats(w.bounds, pick_ints(stored, entry, (ints)(0))), R(0.0));
 }
 
-// The value at a place of a ray; 0 in extinction where no brick is stored.
-INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value) {
-    const cell c = cell_at(place_of(r, number), w.grid.about);
-    const ints entry = brick_at(c, w.grid);
-    const mask stored = active & is_stored(entry);
-    *value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
-    return stored;
-}
-
 INLINE real extinction_at(grid_ray r, real value, world w) { return opacity_of(value, w); }
 INLINE int shines_itself(world w) { return w.settings->shines; }

@@ -1,4 +1,5 @@
 // What pictures of grids ask the formula by themselves: planes, and normals where rays meet a surface.
+#include "numbers/dual.h"
 #include "formula.h"
 #include "solids.h"
 #include "escape.h"

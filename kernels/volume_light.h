@@ -10,16 +10,11 @@ INLINE real light_through(vec point, vec normal, vec toward, real distance, mask
     real number = R(0.0), through = R(1.0);
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
-        cell c;
-        ints entry;
-        real onward;
-        const mask seen = look(g, number, &active, w, &c, &entry, &onward, steps);
-        if (any_lane(seen)) {
-            onward = pick(seen, number + R(1.0), onward);
-            through = pick(seen, through * part_through(grid_value(c, entry, seen, w.grid), w), through);
-            active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
-        }
-        number = onward;
+        real value;
+        const mask seen = look(g, number, &active, w, &value, &number, steps);
+        if (!any_lane(seen)) continue;
+        through = pick(seen, through * part_through(value, w), through);
+        active &= less(R(1.0) - (real)(w.settings->opacity_limit), through);
     }
     return through;
 }

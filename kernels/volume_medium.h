@@ -42,27 +42,22 @@ INLINE void unlit_light(unlit *u, sight *e, ray r, grid_ray g, vec to_viewer, wo
 
 // One place further; the lanes through which no light gets any more are active no longer.
 INLINE mask sight_step(sight *e, unlit *u, grid_ray g, mask active, real *number, quads *q, world w, real *looked) {
-    cell c;
-    ints entry;
-    real onward;
-    const mask seen = look(g, *number, &active, w, &c, &entry, &onward, looked);
-    if (any_lane(seen)) {
-        const real value = grid_value(c, entry, seen, w.grid), opacity = opacity_of(value, w);
-        const mask adds = seen & less(R(0.0), opacity);
-        onward = pick(seen, *number + R(1.0), onward);
-        if (w.settings->shines) {
-            sight_quads(e, distance_of(g, *number, w), seen, q, w);
-            e->light = color_pick(seen, color_add(e->light, color_scale(emission_of(value, w), e->through)), e->light);
-        }
-        if (any_lane(adds)) {
-            const real t = distance_of(g, *number, w);
-            sight_quads(e, t, adds, q, w);
-            const real weight = sight_pass(e, opacity, t, value, adds);
-            unlit_add(u, *number, value, weight, e->middle_way, adds);
-            active &= less(R(1.0) - (real)(w.settings->opacity_limit), e->through);
-        }
+    const real here = *number;
+    real value;
+    const mask seen = look(g, here, &active, w, &value, number, looked);
+    if (!any_lane(seen)) return active;
+    const real opacity = opacity_of(value, w), t = distance_of(g, here, w);
+    const mask adds = seen & less(R(0.0), opacity);
+    if (w.settings->shines) {
+        sight_quads(e, t, seen, q, w);
+        e->light = color_pick(seen, color_add(e->light, color_scale(emission_of(value, w), e->through)), e->light);
     }
-    *number = onward;
+    if (any_lane(adds)) {
+        sight_quads(e, t, adds, q, w);
+        const real weight = sight_pass(e, opacity, t, value, adds);
+        unlit_add(u, here, value, weight, e->middle_way, adds);
+        active &= less(R(1.0) - (real)(w.settings->opacity_limit), e->through);
+    }
     return active;
 }
 

@@ -66,24 +66,37 @@ INLINE real leave(grid_ray r, real number, cell c, ints shift, ints side) {
     return to_reals(to_ints(most(first, number))) + R(1.0);
 }
 
-// Looks at the place of each moving lane: those in the result are where something may be seen, the others of `moving` can go
-// on to the place `onward`; lanes past the ray's end move no more.
-INLINE mask look(grid_ray r, real number, mask *moving, world w, cell *c, ints *entry, real *onward, real *steps) {
+// Looks at the place of each moving lane: those in the result are where something may be seen, and have a value. `onward`: the place
+// to which lanes can go on; those past the ray's end move no more.
+INLINE mask look(grid_ray r, real number, mask *moving, world w, real *value, real *onward, real *steps) {
     *moving &= less(distance_of(r, number, w), r.far);
     *steps += pick(*moving, R(1.0), R(0.0));
-    *c = cell_at(place_of(r, number), w.grid.about);
-    *entry = brick_at(*c, w.grid);
-    const mask stored = is_stored(*entry);
-    const ints digits = (~*entry >> r.octant) & 0x010101;
+    const cell c = cell_at(place_of(r, number), w.grid.about);
+    const ints entry = brick_at(c, w.grid);
+    const mask stored = is_stored(entry);
+    const ints digits = (~entry >> r.octant) & 0x010101;
     ints shift = (ints)(3), side = (ints)(1) << ((digits | digits >> 7 | digits >> 14) & 7);
     mask seen = stored & ~stored;
     if (any_lane(stored)) {
-        const ints octant = octant_at(*c, *entry, stored, w.grid, &seen);
+        const ints octant = octant_at(c, entry, stored, w.grid, &seen);
         shift = pick_ints(stored, pick_ints(equal_ints(octant, (ints)(0)), (ints)(2), (ints)(1)), shift);
         side = pick_ints(stored, (ints)(1), side);
     }
-    *onward = leave(r, number, *c, shift, side);
-    return *moving & seen;
+    *onward = leave(r, number, c, shift, side);
+    seen &= *moving;
+    if (!any_lane(seen)) return seen;
+    *value = grid_value(c, entry, seen, w.grid);
+    *onward = pick(seen, number + R(1.0), *onward);
+    return seen;
+}
+
+// The value at a place of a ray; 0 where no brick is stored.
+INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value) {
+    const cell c = cell_at(place_of(r, number), w.grid.about);
+    const ints entry = brick_at(c, w.grid);
+    const mask stored = active & is_stored(entry);
+    *value = pick(stored, grid_value(c, entry, stored, w.grid), R(0.0));
+    return stored;
 }
 
 // A place in the transfer table.

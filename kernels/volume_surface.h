@@ -10,15 +10,12 @@ INLINE mask surface_met(grid_ray g, mask active, world w, real *at, real *looked
     real number = R(0.0);
     for (int i = 0; i < w.settings->max_steps; ++i) {
         if (!any_lane(active)) break;
-        cell c;
-        ints entry;
-        real onward;
-        const mask seen = look(g, number, &active, w, &c, &entry, &onward, looked);
+        real value, onward;
+        const mask seen = look(g, number, &active, w, &value, &onward, looked);
         if (any_lane(seen)) {
-            const mask met = seen & less_equal((real)(w.settings->level), grid_value(c, entry, seen, w.grid));
+            const mask met = seen & less_equal((real)(w.settings->level), value);
             found |= met;
             active &= ~met;
-            onward = pick(seen, number + R(1.0), onward);
         }
         number = pick(active, onward, number);
     }
@@ -27,10 +24,8 @@ INLINE mask surface_met(grid_ray g, mask active, world w, real *at, real *looked
     for (int i = 0; i < TURNS(HALVINGS); ++i) {
         if (!any_lane(found)) break;
         const real middle = R(0.5) * (low + high);
-        const cell c = cell_at(place_of(g, middle), w.grid.about);
-        const ints entry = brick_at(c, w.grid);
-        const mask stored = found & is_stored(entry);
-        const mask inside = stored & less_equal((real)(w.settings->level), grid_value(c, entry, stored, w.grid));
+        real value;
+        const mask stored = value_met(g, middle, found, w, &value), inside = stored & less_equal((real)(w.settings->level), value);
         high = pick(inside, middle, high);
         low = pick(inside, low, middle);
     }

@@ -1,0 +1,11 @@
+// What texts of pictures include, whether they know a formula or not.
+#include "lanes.h"
+#include "numbers/real.h"
+#include "vectors.h"
+#include "structs.h"
+#include "camera.h"
+#include "sampling.h"
+#include "shade.h"
+#include "tiles.h"
+#include "pixel.h"
+#include "planes.h"
