@@ -112,16 +112,10 @@ CALLED escaped solids_escape(const vec *point, mask active, int smooth, int peri
         const escaped one = one_escape(solid_own(o, *point), active, smooth, periodicity, own, o, k);
         const real count = pick(one.inside, limit, fmin(one.count, limit));
         all.applications += one.applications;
-        if (o->join == JOIN_CUT) {
-            all.inside &= ~one.inside;
-            all.count = pick(one.inside, R(0.0), all.count);
-        } else if (o->join == JOIN_INTERSECTION) {
-            all.inside &= one.inside;
-            all.count = fmin(all.count, count);
-        } else {
-            all.inside |= one.inside;
-            all.count = fmax(all.count, count);
-        }
+        all.inside = inside_joined(o->join, all.inside, one.inside);
+        if (o->join == JOIN_CUT) all.count = pick(one.inside, R(0.0), all.count);
+        else if (o->join == JOIN_INTERSECTION) all.count = fmin(all.count, count);
+        else all.count = fmax(all.count, count);
     }
     if (orbit->flows) {
         all.inside |= solids_inside(point, active, most, orbit, k).inside;

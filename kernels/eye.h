@@ -35,12 +35,7 @@ INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;
     sample_offset(s.span, &here->at, s.sample, &across, &below);
     aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
-    const uint seed = (uint)s.span.sampling->seed;
-    if (s.span.view->has_lens) {
-        unit_square((bits)((uint)s.sample), pixel_seed(here->at.columns, here->at.rows, seed, PURPOSE_LENS), &a.lens_x, &a.lens_y);
-        unit_disk(a.lens_x, a.lens_y, &a.lens_x, &a.lens_y);
-    }
-    if (s.span.view->spans > 0) a.time = shutter_time(here->at.columns, here->at.rows, seed, s.sample);
+    sample_of_lens(&here->at, s.sample, (uint)s.span.sampling->seed, s.span.view, &a.lens_x, &a.lens_y, &a.time);
     return a;
 }
 

@@ -27,9 +27,7 @@ typedef struct {
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     const real ahead = goal == GOAL_WALK ? R(0.0) : ENTRANCE_START * (real)(settings->detail) * r.footprint;
     const real start = r.near + ahead;
-    m->r = ray_pick(fresh, r, m->r);
-    m->active |= fresh;
-    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    MARCH_TAKES(m, r, fresh);
     m->t = pick(fresh, start, m->t);
     m->low = pick(fresh, r.near, m->low);
     m->high = pick(fresh, r.near, m->high);
@@ -80,10 +78,7 @@ INLINE real march_goes_to(const march *m, real onward) {
 // One step of the active lanes; those that arrive, or leave their ray's part, are active no longer.
 INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    const vec point = vec_along(m->r.origin, m->t, m->r.direction);
-    const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
-    m->found.steps += pick(m->active, R(1.0), R(0.0));
-    m->found.count += pick(m->active, here.count, R(0.0));
+    MARCH_TESTS(m, point, here);
     const mask inside = m->active & here.inside, outside = m->active & ~here.inside;
     const mask done = march_misses(m, outside, cone) | march_places(m, inside, outside);
     const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));

@@ -50,9 +50,7 @@ INLINE mask at_ball(const sight *s) { return less(s->radius, s->near); }
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
-    m->r = ray_pick(fresh, r, m->r);
-    m->active |= fresh;
-    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    MARCH_TAKES(m, r, fresh);
     m->t = pick(fresh, r.near, m->t);
     m->low = pick(fresh, r.near, m->low);
     m->high = pick(fresh, (real)(REAL_LARGEST), m->high);

@@ -29,9 +29,7 @@ typedef struct {
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     const real step = (real)(settings->step);
     const real start = goal == GOAL_POINT ? clamp(r.known, r.near, r.far) : r.near;
-    m->r = ray_pick(fresh, r, m->r);
-    m->active |= fresh;
-    m->found = crossing_pick(fresh, nothing_met(r.near), m->found);
+    MARCH_TAKES(m, r, fresh);
     m->t = pick(fresh, start, m->t);
     m->pace = pick(fresh, goal == GOAL_SHADOW ? fmin(SHADOW_FIRST * r.footprint, step) : step, m->pace);
     m->low = pick(fresh, start, m->low);
@@ -44,10 +42,7 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record sett
 INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     const real step = (real)(settings->step);
     const int narrows = goal == GOAL_SURFACE || goal == GOAL_POINT;
-    const vec point = vec_along(m->r.origin, m->t, m->r.direction);
-    const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
-    m->found.steps += pick(m->active, R(1.0), R(0.0));
-    m->found.count += pick(m->active, here.count, R(0.0));
+    MARCH_TESTS(m, point, here);
     const mask inside = m->active & here.inside;
     const mask outside = m->active & ~here.inside;
     m->seen_inside |= inside;

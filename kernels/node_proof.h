@@ -174,11 +174,8 @@ INLINE mask node_inside(vec middle, vec half_side, mask candidates, orbit_record
     if (!JOINED) return formula_node_inside(middle, half_side, candidates, orbit, k);
     mask beside, all = one_holds(middle, half_side, candidates, &beside, orbit, k);
     for (int i = 1; i < orbit->solids; ++i) {
-        const int join = orbit[i].join;
         const mask more = one_holds(middle, half_side, candidates, &beside, orbit + i, k);
-        if (join == JOIN_CUT) all &= beside;
-        else if (join == JOIN_INTERSECTION) all &= more;
-        else all |= more;
+        all = inside_joined(orbit[i].join, all, orbit[i].join == JOIN_CUT ? ~beside : more);
     }
     return all;
 }

@@ -82,6 +82,16 @@ INLINE void sample_offset(pass s, const packet_pixels *at, int sample, real *acr
     filter_offset(u, v, s.sampling->filter, (real)(s.sampling->filter_width), across, below);
 }
 
+// Where a sample goes through the lens, lens radii from its middle, and when.
+INLINE void sample_of_lens(const packet_pixels *at, int sample, uint seed, view_record view, real *lens_x, real *lens_y, real *time) {
+    *lens_x = *lens_y = *time = R(0.0);
+    if (view->has_lens) {
+        unit_square((bits)((uint)sample), pixel_seed(at->columns, at->rows, seed, PURPOSE_LENS), lens_x, lens_y);
+        unit_disk(*lens_x, *lens_y, lens_x, lens_y);
+    }
+    if (view->spans > 0) *time = shutter_time(at->columns, at->rows, seed, sample);
+}
+
 // Adds one sample to the sums of the packet's pixels; `offset`: its distance squared from the middle, pixels.
 INLINE void sample_add(pass s, pixel *p, shot found, mask active, real offset) {
     pixel_add(p, found, active, offset);

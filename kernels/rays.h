@@ -26,5 +26,17 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
                       pick(m, yes.steps, no.steps), pick(m, yes.count, no.count), pick(m, yes.bad, no.bad)};
 }
 
+// What every march begins with: lanes `fresh` take a ray, of which nothing is found yet.
+#define MARCH_TAKES(m, ray, fresh)                                              \
+    (m)->r = ray_pick(fresh, ray, (m)->r);                                      \
+    (m)->active |= fresh;                                                       \
+    (m)->found = crossing_pick(fresh, nothing_met((ray).near), (m)->found)
+// The inside test at the present places of a march.
+#define MARCH_TESTS(m, point, here)                                                                 \
+    const vec point = vec_along((m)->r.origin, (m)->t, (m)->r.direction);                           \
+    const orbit_end here = orbit_solid(point, (m)->active, orbit->iterations, orbit, k);            \
+    (m)->found.steps += pick((m)->active, R(1.0), R(0.0));                                          \
+    (m)->found.count += pick((m)->active, here.count, R(0.0))
+
 // The goal of a march (see march.h and march_steps.h).
 enum { GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE, GOAL_WALK };

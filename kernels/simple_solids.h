@@ -7,6 +7,11 @@ INLINE vec solid_own(orbit_record o, vec point) {
     return vec_along_axes(o, a);
 }
 
+// What is inside of solids and one more, by how that is joined to them.
+INLINE mask inside_joined(int join, mask all, mask one) {
+    return join == JOIN_CUT ? all & ~one : join == JOIN_INTERSECTION ? all & one : all | one;
+}
+
 // A gradient in its own units as a direction of space.
 INLINE vec solid_turned(orbit_record o, vec own) { return vec_normalize(vec_of_axes(o, own)); }
 

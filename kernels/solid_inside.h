@@ -152,11 +152,6 @@ INLINE void solid_inside(const vec *points, mask *inside, orbit_record orbit, co
     for (int i = 1; i < orbit->solids; ++i) {
         mask more[PACKETS];
         one_inside(points, more, orbit + i, k);
-        const int join = orbit[i].join;
-        for (int p = 0; p < TURNS(PACKETS); ++p) {
-            if (join == JOIN_CUT) inside[p] &= ~more[p];
-            else if (join == JOIN_INTERSECTION) inside[p] &= more[p];
-            else inside[p] |= more[p];
-        }
+        for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = inside_joined(orbit[i].join, inside[p], more[p]);
     }
 }

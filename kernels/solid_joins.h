@@ -50,6 +50,13 @@ INLINE real nearest_before(orbit_record o, const solid_found *all) {
     return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
 }
 
+// All distances by one way to put two together.
+#define FOLDED(JOIN)                              \
+    all->far = JOIN(all->far, more.far);          \
+    all->most = JOIN(all->most, more.far);        \
+    all->near = JOIN(all->near, more.near);       \
+    all->apart = JOIN(all->apart, more.apart);
+
 // Joins one more solid to those before it. `rounding`: what a place is not known better than.
 INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real rounding) {
     if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
@@ -75,10 +82,7 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
         }
         all->surface = surface_point_pick(counts, more.surface, all->surface);
         all->scale = pick(counts, more.scale, all->scale);
-        all->far = fmax(all->far, more.far);
-        all->most = fmax(all->most, more.far);
-        all->near = fmax(all->near, more.near);
-        all->apart = fmax(all->apart, more.apart);
+        FOLDED(fmax)
         all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
         return;
     }
@@ -95,19 +99,14 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
         const surface_point flowing = surface_flowing(all->surface, more.surface, closer, of_more);
         all->surface = surface_point_pick(flows, flowing, surface_point_pick(nearer, more.surface, all->surface));
         all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
-        all->far = pick(flows, lower * scale, fmin(all->far, more.far));
-        all->most = pick(flows, all->far, fmin(all->most, more.far));
-        all->near = pick(flows, all->far, fmin(all->near, more.near));
-        all->apart = pick(flows, all->far, fmin(all->apart, more.apart));
+#define FLOWING(a, b) pick(flows, lower * scale, fmin(a, b))
+        FOLDED(FLOWING)
         all->scale = pick(flows, scale, pick(nearer, more.scale, all->scale));
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
         return;
     }
     all->surface = surface_point_pick(nearer, more.surface, all->surface);
     all->scale = pick(nearer, more.scale, all->scale);
-    all->far = fmin(all->far, more.far);
-    all->most = fmin(all->most, more.far);
-    all->near = fmin(all->near, more.near);
-    all->apart = fmin(all->apart, more.apart);
+    FOLDED(fmin)
     all->inside |= more.inside;
 }

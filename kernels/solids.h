@@ -157,9 +157,7 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, orbit_r
                 inside = near & end.inside;
             }
         }
-        if (o->join == JOIN_CUT) all.inside &= ~inside;
-        else if (o->join == JOIN_INTERSECTION) all.inside &= inside;
-        else all.inside |= inside;
+        all.inside = inside_joined(o->join, all.inside, inside);
     }
     return all;
 }

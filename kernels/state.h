@@ -27,54 +27,33 @@ INLINE __global scalar *asked_at(stage s, int place, int i, world w) {
 }
 INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return asked_at(s, place, w.settings->bump_asked, w); }
 
-// A slice of a thing: numbers from `first` on.
-#define SLICE_KEEP(s, thing, first, count, part, i) \
-    KEEP_NUMBERS((const real *)(thing) + (first), count, state_part(s, part) + (i) * (count) * (s).stride, (s).stride)
-#define SLICE_RECALL(s, thing, first, count, part, i) \
-    RECALL_NUMBERS((real *)(thing) + (first), count, state_part(s, part) + (i) * (count) * (s).stride, (s).stride)
+// Things of slices, of which `i` may be kept one after the other: TYPE_keep_one, TYPE_kept_one. Slices that the scene does not need are
+// not kept, and as in `nothing`.
+#define KEEP_SLICE(SLICE)                                                                                                   \
+    KEEP_NUMBERS((const real *)thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride, s.stride);
+#define RECALL_SLICE(SLICE)                                                                                                 \
+    RECALL_NUMBERS((real *)&thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride, s.stride);
+#define KEEP_SLICE_NEEDED(SLICE) if (KEEPS(s, STATE_##SLICE)) KEEP_SLICE(SLICE)
+#define RECALL_SLICE_NEEDED(SLICE) if (KEEPS(s, STATE_##SLICE)) RECALL_SLICE(SLICE)
+#define OF_SLICES(type, SLICES, nothing)                                                                                    \
+    INLINE void type##_keep_one(stage s, const type *thing, int i) { SLICES(KEEP_SLICE, KEEP_SLICE_NEEDED) }                \
+    INLINE type type##_kept_one(stage s, int i) {                                                                           \
+        type thing = nothing;                                                                                               \
+        SLICES(RECALL_SLICE, RECALL_SLICE_NEEDED)                                                                           \
+        return thing;                                                                                                       \
+    }
+OF_SLICES(aim, AIM_SLICES, {R(0.0)})
+OF_SLICES(spot, SPOT_SLICES, {R(0.0)})
+#define IN_THE_OPEN ((carried){.wave = R(-1.0), .flight = (real)(REAL_LARGEST)})
+OF_SLICES(carried, CARRIED_SLICES, IN_THE_OPEN)
 
-INLINE void aim_keep(stage s, const aim *a) {
-    SLICE_KEEP(s, a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
-    if (KEEPS(s, STATE_THROUGH_LENS)) SLICE_KEEP(s, a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
-}
-
-INLINE aim aim_kept(stage s) {
-    aim a = {R(0.0)};
-    SLICE_RECALL(s, &a, 0, AIM_AT_NUMBERS, STATE_AIM_AT, 0);
-    if (KEEPS(s, STATE_THROUGH_LENS)) SLICE_RECALL(s, &a, AIM_AT_NUMBERS, THROUGH_LENS_NUMBERS, STATE_THROUGH_LENS, 0);
-    return a;
-}
-
+#define aim_keep(s, a) aim_keep_one(s, a, 0)
+#define aim_kept(s) aim_kept_one(s, 0)
 // The first spot, or that after the last bounce.
-INLINE spot spot_kept(stage s, int bounce) {
-    spot here = {R(0.0)};
-    SLICE_RECALL(s, &here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
-    if (KEEPS(s, STATE_SPOT_THING)) SLICE_RECALL(s, &here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
-    return here;
-}
-
-INLINE void spot_keep(stage s, const spot *here, int bounce) {
-    SLICE_KEEP(s, here, 0, SPOT_SEEN_NUMBERS, STATE_SPOT_SEEN, bounce > 0);
-    if (KEEPS(s, STATE_SPOT_THING)) SLICE_KEEP(s, here, SPOT_SEEN_NUMBERS, SPOT_THING_NUMBERS, STATE_SPOT_THING, bounce > 0);
-}
-
-// What a path carries: slices that the scene does not need say that it is in the open.
-#define FLIGHT_FIRST (ASKED_LIGHT_NUMBERS + WITHIN_NUMBERS)
-INLINE void carried_keep(stage s, const carried *with) {
-    SLICE_KEEP(s, with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
-    if (KEEPS(s, STATE_WITHIN)) SLICE_KEEP(s, with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
-    if (KEEPS(s, STATE_FLIGHT)) SLICE_KEEP(s, with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
-}
-
-INLINE carried carried_kept(stage s) {
-    carried with = {{R(0.0)}};
-    with.wave = R(-1.0);
-    with.flight = (real)(REAL_LARGEST);
-    SLICE_RECALL(s, &with, 0, ASKED_LIGHT_NUMBERS, STATE_ASKED_LIGHT, 0);
-    if (KEEPS(s, STATE_WITHIN)) SLICE_RECALL(s, &with, ASKED_LIGHT_NUMBERS, WITHIN_NUMBERS, STATE_WITHIN, 0);
-    if (KEEPS(s, STATE_FLIGHT)) SLICE_RECALL(s, &with, FLIGHT_FIRST, FLIGHT_NUMBERS, STATE_FLIGHT, 0);
-    return with;
-}
+#define spot_keep(s, here, bounce) spot_keep_one(s, here, (bounce) > 0)
+#define spot_kept(s, bounce) spot_kept_one(s, (bounce) > 0)
+#define carried_keep(s, with) carried_keep_one(s, with, 0)
+#define carried_kept(s) carried_kept_one(s, 0)
 
 // Where a number of it is kept.
 INLINE int carried_number(__constant const int *at, int number) {

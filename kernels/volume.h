@@ -5,17 +5,12 @@
 #include "pictures.h"
 #include "grid.h"
 #include "volume_ray.h"
+#include "passes.h"
 
 // The ray of a sample, and its place in the shutter's time.
 INLINE ray sample_ray(const packet_pixels *at, real across, real below, int sample, world w, real *time) {
-    real lens_x = R(0.0), lens_y = R(0.0);
-    *time = R(0.0);
-    if (w.view->has_lens) {
-        const bits seed = pixel_seed(at->columns, at->rows, (uint)w.sampling->seed, PURPOSE_LENS);
-        unit_square((bits)((uint)sample), seed, &lens_x, &lens_y);
-        unit_disk(lens_x, lens_y, &lens_x, &lens_y);
-    }
-    if (w.view->spans > 0) *time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
+    real lens_x, lens_y;
+    sample_of_lens(at, sample, (uint)w.sampling->seed, w.view, &lens_x, &lens_y, time);
     return camera_ray(at->x + across, at->y + below, lens_x, lens_y, *time, w.view);
 }
 

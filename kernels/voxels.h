@@ -40,16 +40,13 @@ INLINE vec voxel_points(ulong place, int first, int4 sub_point, __global const s
     __kernel void name(__global uchar *samples, __global const ulong *bricks, int first, __global const uchar *known, int floats, \
                        float scale, __global const scalar *axes, __constant const struct Lattice *lattice,                        \
                        orbit_record orbit, constants k)
-// The head of each: the brick and the voxel of a work-item.
-#define FILL_BEGINS(brick, item)                                \
-    if (orbit_cancelled(orbit)) return;                         \
-    const size_t brick = (size_t)first + get_global_id(1);      \
-    const int item = (int)get_global_id(0) * ITEM_VOXELS
-
-// Whether a voxel's octant is known to hold nothing (which = 0), or nothing else (1).
-INLINE bool octant_is_known(__global const uchar *known, size_t brick, int voxel, int which) {
-    return ((known[2 * brick + which] >> (voxel / OCTANT_VOXELS)) & 1) != 0;
-}
+// The head of each: the brick and the voxel of a work-item, and whether this one's octant is known to hold nothing, or nothing else.
+#define FILL_BEGINS(brick, place, item, empty, full)                                    \
+    if (orbit_cancelled(orbit)) return;                                                 \
+    const size_t brick = (size_t)first + get_global_id(1);                              \
+    const ulong place = bricks[brick];                                                  \
+    const int item = (int)get_global_id(0) * ITEM_VOXELS, octant = item / OCTANT_VOXELS; \
+    const bool empty = (known[2 * brick] >> octant & 1) != 0, full = (known[2 * brick + 1] >> octant & 1) != 0
 
 // Keeps the values of a packet from voxel `first` on: as floats, or as bytes that are `scale` times as large.
 INLINE void keep_values(__global uchar *samples, size_t brick, int first, real values, int floats, float scale) {

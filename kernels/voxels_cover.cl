@@ -23,9 +23,7 @@ INLINE void packet_shares(ulong place, int first, real *shares, __global const s
 }
 
 FILL(cover_bricks) {
-    FILL_BEGINS(brick, item);
-    const ulong place = bricks[brick];
-    const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
+    FILL_BEGINS(brick, place, item, empty, full);
     for (int part = 0; part < ITEM_VOXELS; part += LANES * PACKETS) {
         real found[PACKETS];
         for (int p = 0; p < TURNS(PACKETS); ++p) found[p] = full ? R(1.0) : R(0.0);

@@ -2,9 +2,7 @@
 #include "voxels.h"
 
 FILL(fill_bricks) {
-    FILL_BEGINS(brick, item);
-    const ulong place = bricks[brick];
-    const bool empty = octant_is_known(known, brick, item, 0), full = octant_is_known(known, brick, item, 1);
+    FILL_BEGINS(brick, place, item, empty, full);
     uint bits = full ? 0xffffffffu : 0u;
     for (int part = 0; part < ITEM_VOXELS && !empty && !full; part += LANES * PACKETS) {
         vec points[PACKETS];

@@ -97,10 +97,7 @@ INLINE void walk_enters(march *m, walk *a, mask here, world w) {
 INLINE void walk_step(march *m, walk *a, int bounce, world w, orbit_record orbit, constants k) {
     march_record settings = w.settings;
     const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    const vec point = vec_along(m->r.origin, m->t, m->r.direction);
-    const orbit_end here = orbit_solid(point, m->active, orbit->iterations, orbit, k);
-    m->found.steps += pick(m->active, R(1.0), R(0.0));
-    m->found.count += pick(m->active, here.count, R(0.0));
+    MARCH_TESTS(m, point, here);
     // The set ends where its bounds do.
     const vec middle = vec_sub(point, vec_splat(settings->bounds_center));
     const mask within = here.inside & less_equal(vec_dot(middle, middle), (real)(settings->bounds_radius * settings->bounds_radius));

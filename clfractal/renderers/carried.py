@@ -186,7 +186,7 @@ SPOT = _whole("spot", "A place on the surface.", SPOT_SEEN, SPOT_THING)
 CARRIED = _whole(
     "carried", "What a path of light carries from a spot to the next.", ASKED_LIGHT, WITHIN, FLIGHT
 )
-SLICES = (AIM_AT, THROUGH_LENS, SPOT_SEEN, SPOT_THING, ASKED_LIGHT, WITHIN, FLIGHT)
+SLICES = {AIM: (AIM_AT, THROUGH_LENS), SPOT: (SPOT_SEEN, SPOT_THING), CARRIED: (ASKED_LIGHT, WITHIN, FLIGHT)}
 FACE = _carried(
     "plane_face",
     "Where a plane opens the set on the way to the next spot.",
@@ -283,6 +283,17 @@ TYPES = (
 
 
 def carried_text() -> str:
-    """The declarations of TYPES in C, for inclusion after `color.h`."""
-    slices = [f"#define {each.name.upper()}_NUMBERS {each.numbers}" for each in SLICES]
+    """The declarations of TYPES in C, for inclusion after `vectors.h`."""
+    slices: list[str] = []
+    for whole, each in SLICES.items():
+        begin = 0
+        for part in each:
+            slices += [
+                f"#define {part.name.upper()}_FIRST {begin}",
+                f"#define {part.name.upper()}_NUMBERS {part.numbers}",
+            ]
+            begin += part.numbers
+        first, *others = (part.name.upper() for part in each)
+        listed = " ".join([f"ALWAYS({first})", *(f"NEEDED({name})" for name in others)])
+        slices.append(f"#define {whole.name.upper()}_SLICES(ALWAYS, NEEDED) {listed}")
     return "\n".join([*slices, *(each.c_text() for each in TYPES)])
