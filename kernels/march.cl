@@ -5,7 +5,7 @@
 #include "march.h"
 #include "marches.h"
 
-STAGE(march_rays) MARCHES_SHARES(0)
+STAGE(march_rays) { MARCH_SHARES(0); }
 #if LANES == 1
-STAGE(look_at_surfaces) LOOKS_AT_SURFACES(0)
+STAGE(look_at_surfaces) { LOOK_AT_SURFACES(0); }
 #endif

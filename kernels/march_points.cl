@@ -4,7 +4,7 @@
 #include "march.h"
 #include "marches.h"
 
-STAGE(march_points) MARCHES_SHARES(1)
+STAGE(march_points) { MARCH_SHARES(1); }
 #if LANES == 1
-STAGE(look_at_points) LOOKS_AT_SURFACES(1)
+STAGE(look_at_points) { LOOK_AT_SURFACES(1); }
 #endif

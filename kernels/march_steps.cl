@@ -4,7 +4,7 @@
 #include "march_steps.h"
 #include "marches.h"
 
-STAGE(step_rays) MARCHES_SHARES(settings->point_count > 1)
+STAGE(step_rays) { MARCH_SHARES(settings->point_count > 1); }
 #if LANES == 1
-STAGE(look_where_steps_end) LOOKS_AT_SURFACES(settings->point_count > 1)
+STAGE(look_where_steps_end) { LOOK_AT_SURFACES(settings->point_count > 1); }
 #endif

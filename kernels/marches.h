@@ -6,17 +6,13 @@
 #include "surface_at.h"
 
 // Nobody counts the steps that lanes of cones have waited.
-#define MARCHES_SHARES(known)                                                                             \
-    {                                                                                                     \
-        const queue q = MARCH_QUEUE(known);                                                               \
-        const share mine = share_of_item(ITEM, slice, q);                                                 \
-        if (mine.next >= mine.end || WAS_CANCELLED) return;                                               \
-        const int waits = march_share(mine, q, goal, settings, orbit, k);                                 \
-        look_at_share(mine, q, goal, settings, orbit, k);                                                 \
-        if (LANES > 1 && goal != GOAL_CONE) atomic_add(STATISTICS_HERE + STATISTIC_WAITS, (uint)waits);   \
-    }
-#define LOOKS_AT_SURFACES(known)                                                                          \
-    {                                                                                                     \
-        const queue q = MARCH_QUEUE(known);                                                               \
-        if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k);              \
-    }
+#define MARCH_SHARES(known)                                                                        \
+    const queue q = MARCH_QUEUE(known);                                                            \
+    const share mine = share_of_item(ITEM, slice, q);                                              \
+    if (mine.next >= mine.end || WAS_CANCELLED) return;                                            \
+    const int waits = march_share(mine, q, goal, settings, orbit, k);                              \
+    look_at_share(mine, q, goal, settings, orbit, k);                                              \
+    if (LANES > 1 && goal != GOAL_CONE) atomic_add(STATISTICS_HERE + STATISTIC_WAITS, (uint)waits)
+#define LOOK_AT_SURFACES(known)                                                                    \
+    const queue q = MARCH_QUEUE(known);                                                            \
+    if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k)
