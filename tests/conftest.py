@@ -16,6 +16,15 @@ from clfractal.device import drivers_folder
 if TYPE_CHECKING:
     from tests.shell import InProcess
 
+# Asserts of what test modules share tell what they compared, as their own do.
+pytest.register_assert_rewrite(
+    *(
+        f"tests.{path.stem}"
+        for path in Path(__file__).parent.iterdir()
+        if path.stem not in ("__init__", "conftest")
+    )
+)
+
 # Where it belongs, although a test may be the first to use OpenCL that has a temporary folder of its own.
 drivers_folder.path()
 
