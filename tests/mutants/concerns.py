@@ -80,6 +80,7 @@ clfractal/pictures/*: render/film render/film_store render/compose render/anagly
 clfractal/renderers/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
 clfractal/scene/grid_place.py: render/turned_grids
 clfractal/scene/given.py: render/turned_grids scene/volume_scenes
+clfractal/scene/palette.py: scene/ bad_input render/planes_in_picture
 clfractal/scene/*: scene/ bad_input
 clfractal/voxels/*: voxels/ render/volume_rays render/volume_bits
 clfractal/work/var*: work/variations vary_shell
