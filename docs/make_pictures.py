@@ -42,7 +42,7 @@ from PIL import Image
 
 from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
-from clfractal.pictures.anaglyph import filtered
+from clfractal.pictures.anaglyph import IDEAL
 from clfractal.pictures.outputs import png_bytes
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES
@@ -143,7 +143,8 @@ def make_picture(picture: Picture) -> None:
         elif panel.show == "left" or panel.show == "right":
             colors = np.stack([film[name] for name in "RGB"], axis=-1)
             assert panel.scene.stereo is not None
-            shown = Image.fromarray(encode8(filtered(colors, panel.show, panel.scene.stereo.glasses)))
+            behind = IDEAL[panel.scene.stereo.glasses][panel.show == "right"]  # the filter before this eye
+            shown = Image.fromarray(encode8(colors * np.asarray(behind, np.float32)))
         else:
             with Image.open(io.BytesIO(png_bytes(film))) as shown:
                 shown.load()
