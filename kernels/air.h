@@ -70,9 +70,7 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
 
 // How far a ray from the eye goes through the fog.
 INLINE real way_in_fog(stage s, ray r, const spot *here, world w) {
-    real far = pick(mask_of(here->found), vec_dot(vec_sub(here->seen, r.origin), r.direction), (real)(REAL_LARGEST));
-    color shows = color_of(R(0.0), R(0.0), R(0.0));
-    real density = R(0.0), weight = R(0.0);
-    nearest_light(&r.origin, &r.direction, 1, &far, &shows, &density, &weight, w);
+    real far = way_to_spot(here, r);
+    lamp_met(r.origin, r.direction, 1, &far, w);
     return far;
 }

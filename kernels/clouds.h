@@ -31,7 +31,6 @@ INLINE int shines_itself(world w) { return 0; }
 INLINE color emission_of(real value, world w) { return color_of(R(0.0), R(0.0), R(0.0)); }
 
 #include "volume_track.h"
-#include "medium_light.h"
 
 // The part of a cloud's box on a ray before `far`; the result says where there is one.
 INLINE mask cloud_entered(int number, vec origin, vec direction, real far, world w, grid_ray *r) {
@@ -129,9 +128,8 @@ INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_
     *far = pick(found.met, found.t, *far);
     if (!HAS(w, SHINING_CLOUDS)) return found;
     numbers = cloud_stream(s, at, CLOUD_SHINES, w);
-    color more = color_mul(clouds_shine(&so_far->origin, &so_far->direction, *far, here, &numbers, w), so_far->through);
-    if (s.bounce > 0) more = limited(more, w.settings);
-    so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
+    const color shines = clouds_shine(&so_far->origin, &so_far->direction, *far, here, &numbers, w);
+    path_sees(s, so_far, color_mul(shines, so_far->through), here, w);
     return found;
 }
 
@@ -141,33 +139,9 @@ INLINE real light_passes_clouds(stage s, const packet_pixels *at, ray asks, mask
     return clouds_passed(&asks.origin, &asks.direction, asks.far, here & less(R(0.0), asks.far), &numbers, w);
 }
 
-// Scatters paths where clouds have met them, for lanes `here`: one light is asked for, by a ray that `stop` keeps, and one direction
-// followed.
-INLINE void path_in_cloud(stage s, const packet_pixels *at, path *so_far, carried *with, const cloud_place *place, halt *stop, mask here,
-                          world w) {
-    if (!any_lane(here)) return;
-    path p = *so_far;
-    carried c = *with;
-    const vec before = p.direction;
-    p.origin = vec_along(p.origin, place->t, before);
-    p.footprint += p.spread * place->t;
-    p.through = color_mul(p.through, place->keeps);
-    real u, v, unused, roulette, numbers[ASKING_NUMBERS];
-    path_asking(s, at, w, numbers);
-    c.total = weight_of_all(p.origin, R(0.0), w);
-    asked a;
-    const color brings = color_mul(medium_asks(p.origin, before, place->anisotropy, numbers, c.total, w, &a), p.through);
-    // The boundary of a body would bend the way out of it: nobody asks from inside.
-    const mask open = equal(c.medium, R(0.0)), asking = here & open & less(R(0.0), brightest(brings));
-    c.awaited = color_pick(asking, brings, color_of(R(0.0), R(0.0), R(0.0)));
-    path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
-    p.direction = phase_direction(before, u, v, place->anisotropy);
-    c.density = pick(open, phase_of(vec_dot(before, p.direction), place->anisotropy), R(-1.0));
-    path_square(s, at, PURPOSE_CHOICES, w, &unused, &roulette);
-    path_stays(s, &p, here, roulette, w);
-    if (KEEPS(s, STATE_FLIGHT)) path_sets_out(s, at, &p, &c, PURPOSE_FLIGHT + NEXT_BOUNCE, mask_of(p.on_path), w);
-    stop->toward = vec_pick(here, a.ray.toward, stop->toward);
-    stop->far = pick(asking & ~a.unblocked, a.ray.distance, stop->far);
-    *so_far = path_pick(here, p, *so_far);
-    *with = carried_pick(here, c, *with);
+// Brings paths to where clouds have met them.
+INLINE void path_in_cloud(path *so_far, const cloud_place *place, mask here) {
+    path_flies(so_far, place->t, here);
+    so_far->through = color_pick(here, color_mul(so_far->through, place->keeps), so_far->through);
+    so_far->on_path = pick(here & ~less(R(0.0), brightest(so_far->through)), R(0.0), so_far->on_path);
 }

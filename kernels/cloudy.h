@@ -4,9 +4,9 @@
 #define PURPOSE_TURN 0x10000u   // from the numbers of one scattering to those of the next
 
 // Brings a path to where it is scattered.
-INLINE void path_flies(path *so_far, const carried *with, mask here) {
-    so_far->origin = vec_pick(here, vec_along(so_far->origin, with->flight, so_far->direction), so_far->origin);
-    so_far->footprint = pick(here, so_far->footprint + so_far->spread * with->flight, so_far->footprint);
+INLINE void path_flies(path *so_far, real way, mask here) {
+    so_far->origin = vec_pick(here, vec_along(so_far->origin, way, so_far->direction), so_far->origin);
+    so_far->footprint = pick(here, so_far->footprint + so_far->spread * way, so_far->footprint);
 }
 
 // Whether nothing at all is in the way of a flight, as far as is known here: only the march knows where the set is.
@@ -29,7 +29,7 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
             here &= flight_is_free(so_far, with, here, w);
             if (!any_lane(here)) return;
             flight_ends(so_far, with, (real)(REAL_LARGEST), here);
-            path_flies(so_far, with, here);
+            path_flies(so_far, with->flight, here);
         }
         const uint more = PURPOSE_TURN * (uint)turn;
         real u, v, choice, roulette;
@@ -47,12 +47,7 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
 // Follows paths that an object's medium `scatters` on their way.
 INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, mask scatters, world w) {
     if (!any_lane(scatters)) return;
-    path p = *so_far;
-    carried c = *with;
-    c.density = R(-1.0);
-    c.awaited = color_of(R(0.0), R(0.0), R(0.0));
-    path_flies(&p, &c, scatters);
-    path_scatters(s, at, &p, &c, scatters, w);
-    *so_far = path_pick(scatters, p, *so_far);
-    *with = carried_pick(scatters, c, *with);
+    with->density = pick(scatters, R(-1.0), with->density);
+    path_flies(so_far, with->flight, scatters);
+    path_scatters(s, at, so_far, with, scatters, w);
 }

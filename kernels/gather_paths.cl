@@ -11,16 +11,10 @@ INLINE real flight_sought(const path *so_far, const carried *with, world w) {
 
 // Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
 STAGE(gather_paths) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    if (paths_are_over(s)) return;
-    const world w = WORLD;
-    path so_far;
-    carried with;
-    STATE_RECALL(s, so_far, STATE_PATH);
-    with = carried_kept(s);
-    tally cost;
-    STATE_RECALL(s, cost, STATE_TALLY);
+    PATH_STAGE_BEGINS(s, w);
+    STATE_KEPT(s, path, so_far, STATE_PATH);
+    carried with = carried_kept(s);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
     const encounter answer = queue_met(s.q, 0, s.slot);
     tally_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
@@ -38,16 +32,11 @@ STAGE(gather_paths) {
 // Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
 // have a part of its weight.
 STAGE(end_paths) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    const world w = WORLD;
+    STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
-    path so_far;
-    carried with;
-    tally cost;
-    STATE_RECALL(s, so_far, STATE_PATH);
-    with = carried_kept(s);
-    STATE_RECALL(s, cost, STATE_TALLY);
+    STATE_KEPT(s, path, so_far, STATE_PATH);
+    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    carried with = carried_kept(s);
     const encounter last = queue_met(s.q, 0, s.slot);
     tally_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
@@ -56,7 +45,7 @@ STAGE(end_paths) {
     lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
     if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, on_path, w);
-    path_ends(&so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
+    path_ends(s, &so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
     if (HAS(w, EMITTERS)) path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
     if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);
     const spot first_spot = spot_kept(s, 0);

@@ -59,10 +59,10 @@ INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
     with->awaited = color_pick(through_glass, absorbed(with->awaited, around, fmax(way, R(0.0))), with->awaited);
 }
 
-// Brings a path over the boundary if its direction leads there.
+// Brings paths that are at a boundary over it if their direction leads there.
 INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, mask sinks, color weights, real wave,
-                         world w) {
-    const mask over = less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
+                         mask lands, world w) {
+    const mask over = ~lands | less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
     const mask stays_out = leads_out(so_far->direction, here->normal, edge.leaving);
     real body = edge.body;
     if (HAS(w, SUBSURFACE)) {
@@ -78,9 +78,9 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     const mask of_set = of_the_set(here->object, w);
     const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
     origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
-    so_far->origin = vec_pick(stays_out & of_set, so_far->origin, origin);
+    so_far->origin = vec_pick(~lands | (stays_out & of_set), so_far->origin, origin);
     // Nobody asks for light that reaches a spot through its own body.
-    with->density = pick(stays_out & ~edge.hidden, with->density, R(-1.0));
+    with->density = pick(~lands | (stays_out & ~edge.hidden), with->density, R(-1.0));
     media_leave(with, edge.body, crosses & edge.leaving);
     media_enter(with, body, crosses & ~edge.leaving);
     if (!any_lane(crosses)) return;

@@ -28,19 +28,6 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
     return sum;
 }
 
-// The light with a place that a path's ray meets before `far`.
-typedef struct {
-    mask met;
-    color shows;
-    real density, weight;   // with which it is asked from the ray's origin, where lights weigh as much in all as `carried` says
-} lamp;
-
-INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) {
-    lamp found = {less(R(1.0), R(0.0)), color_of(R(0.0), R(0.0), R(0.0)), R(0.0), R(0.0)};
-    found.met = nearest_light(&origin, &direction, of_eye, far, &found.shows, &found.density, &found.weight, w);
-    return found;
-}
-
 // One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium, and
 // `own` as above.
 INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
@@ -81,4 +68,16 @@ INLINE real asked_weight(const asked *a, real other) {
     const mask has_size = less(R(0.0), a->ray.density);
     const real density = a->share * a->ray.density;
     return pick(has_size, power_share(a->reckoned * density, pick(a->both, other, R(0.0))) / density, R(1.0) / a->share);
+}
+
+// What it brings if nothing is in its way, where an event scatters light from there with that value and density.
+INLINE color asked_brings(const asked *a, color value, real density) {
+    return color_scale(color_mul(value, a->ray.light), asked_weight(a, density));
+}
+
+// What a path sees at its end that has chosen its direction with `density` where all lights weighed `total`: a lamp, or what is past all.
+INLINE color light_at_end(vec origin, vec direction, const lamp *before, real picture_y, real density, real total, world w) {
+    const real asked = before->weight / total * before->density;
+    const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, asked));
+    return color_pick(before->met, color_scale(before->shows, share), light_past(direction, picture_y, origin, density, total, w));
 }

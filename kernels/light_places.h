@@ -80,3 +80,16 @@ CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, r
     }
     return met | met_on_set(*origin, *direction, of_eye, far, shows, density, weight, w);
 }
+
+// The light with a place that a path's ray meets before `far`.
+typedef struct {
+    mask met;
+    color shows;
+    real density, weight;   // with which it is asked from the ray's origin, where lights weigh as much in all as `carried` says
+} lamp;
+
+INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) {
+    lamp found = {less(R(1.0), R(0.0)), color_of(R(0.0), R(0.0), R(0.0)), R(0.0), R(0.0)};
+    found.met = nearest_light(&origin, &direction, of_eye, far, &found.shows, &found.density, &found.weight, w);
+    return found;
+}

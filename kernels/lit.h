@@ -32,8 +32,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cos
 // for a light, or the number of the medium's.
 INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, real object, mask met) {
     if (!any_lane(met) || s.bounce > 0) return;
-    sighting first;
-    STATE_RECALL(s, first, STATE_SIGHTING);
+    STATE_KEPT(s, sighting, first, STATE_SIGHTING);
     first.coverage = pick(met, R(1.0), first.coverage);
     STATE_KEEP(s, first, STATE_SIGHTING);
     found->found = pick(met, R(1.0), found->found);
@@ -60,15 +59,12 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
     mask on_path = mask_of(so_far->on_path);
     const mask found = mask_of(here->found);
     if (s.bounce > 0) {
-        const color missed = limited(color_mul(sky(direction, picture_y, 1, w), so_far->through), w.settings);
-        so_far->seen = color_pick(on_path & ~found, color_add(so_far->seen, missed), so_far->seen);
+        path_sees(s, so_far, color_mul(sky(direction, picture_y, 1, w), so_far->through), on_path & ~found, w);
     }
     on_path &= found;
     color own = color_of(R(1.0), R(1.0), R(1.0));
     if (!last) own = color_of(R(1.0) - mirrored.r, R(1.0) - mirrored.g, R(1.0) - mirrored.b);
-    color added = color_mul(gathered, color_mul(so_far->through, own));
-    if (s.bounce > 0) added = limited(added, w.settings);
-    so_far->seen = color_pick(on_path, color_add(so_far->seen, added), so_far->seen);
+    path_sees(s, so_far, color_mul(gathered, color_mul(so_far->through, own)), on_path, w);
     so_far->on_path = number_of(on_path);
 }
 

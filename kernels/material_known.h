@@ -24,8 +24,7 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
 // The normal of a spot's relief, length 1; `inside`: where the viewer, and so the spot's normal, is in the set. Slopes that would turn
 // the surface away from the viewer are lowered until it faces him.
 INLINE vec bumped_normal(stage s, const spot *here, mask inside, vec to_viewer) {
-    relief known;
-    STATE_RECALL(s, known, STATE_RELIEF);
+    STATE_KEPT(s, relief, known, STATE_RELIEF);
     const mask rises = mask_of(known.rises);
     vec slope = vec_scale(known.slope, pick(inside, R(-1.0), R(1.0)));
     const real facing = vec_dot(here->normal, to_viewer), turned = vec_dot(slope, to_viewer);

@@ -3,13 +3,10 @@
 #include "cloudy.h"
 #include "clouds.h"
 
-// Finds the paths that a medium scatters before what they have met, and scatters them: they are halted there, and the stage of spots
-// leaves them alone. Last rays that are scattered are nobody's.
+// Finds the paths that a medium scatters before what they have met, and halts them there. Glass has then scattered them, and the stage of
+// spots leaves them alone; in clouds it does with them as at spots. Last rays that are scattered are nobody's.
 STAGE(cross_media) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    if (paths_are_over(s)) return;
-    const world w = WORLD;
+    PATH_STAGE_BEGINS(s, w);
     const int is_last = bounce > w.settings->bounces;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
@@ -48,12 +45,14 @@ STAGE(cross_media) {
         return;
     }
     spot_of_light(s, &found, arrived.origin, arrived.direction, with.flight, with.medium, scatters);
-    halt stop = {number_of(halted), vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0)};
+    halt stop = {pick(scatters, HALTED_BY_GLASS, R(0.0)), R(0.0), R(-1.0)};
     if (KEEPS(s, STATE_FLIGHT)) path_was_scattered(s, &here.at, &so_far, &with, scatters, w);
     if (HAS(w, CLOUDS)) {
         spot_of_light(s, &found, arrived.origin, arrived.direction, cloud.t, cloud.number, cloud.met);
         if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, cloud.met, w);
-        path_in_cloud(s, &here.at, &so_far, &with, &cloud, &stop, cloud.met, w);
+        path_in_cloud(&so_far, &cloud, cloud.met);
+        stop.halted = pick(cloud.met, HALTED_BY_CLOUD, stop.halted);
+        stop.anisotropy = cloud.anisotropy;
     }
     STATE_KEEP(s, so_far, STATE_PATH);
     carried_keep(s, &with);
@@ -62,14 +61,10 @@ STAGE(cross_media) {
 
 // What comes through clouds of the light that was asked for.
 STAGE(pass_clouds) {
-    if (IS_BEYOND) return;
-    STAGE_OF(s);
-    if (paths_are_over(s)) return;
-    const world w = WORLD;
+    PATH_STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     carried with = carried_kept(s);
-    halt stop;
-    STATE_RECALL(s, stop, STATE_HALT);
+    STATE_KEPT(s, halt, stop, STATE_HALT);
     ray asks = queue_ray(s.q, 0, s.slot);
     asks.far = stop.far;
     with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, asks, less(R(0.0), stop.far), w));

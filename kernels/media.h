@@ -153,9 +153,9 @@ typedef struct {
     real around;     // the glass that the body stands in, or 0
 } border;
 
-INLINE border border_at(const carried *with, const spot *here, world w) {
+INLINE border border_at(const carried *with, const spot *here, mask lands, world w) {
     border found;
-    mask glass = less(R(0.0), R(1.0)) & (HAS(w, GLASS_SET) ? ~0 : 0);
+    mask glass = lands & (HAS(w, GLASS_SET) ? ~0 : 0);
     found.body = set_body(w);
     found.leaving = equal(body_of(with->medium), found.body) | equal(body_of(with->under), found.body);
     // What is joined to the set is one body with it.
@@ -166,7 +166,7 @@ INLINE border border_at(const carried *with, const spot *here, world w) {
     for (int i = 0; i < w.settings->object_count; ++i) {
         const mask this_one = beside & equal(here->object, (real)((scalar)(i + 1)));
         if (!w.objects[i].glass || !any_lane(this_one)) continue;
-        glass |= this_one;
+        glass |= this_one & lands;
         // The spot's normal is towards the viewer.
         found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
     }

@@ -17,23 +17,12 @@ INLINE void path_asking(stage s, const packet_pixels *at, world w, real numbers[
     if (w.settings->set_count > 0) path_square(s, at, PURPOSE_SET_LIGHT, w, numbers + 3, numbers + 4);
 }
 
-// Of lanes `here` one path, of the others another; likewise what they carry.
-INLINE path path_pick(mask here, path yes, path no) {
-    for (int i = 0; i < NUMBERS_OF(path); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
-    return no;
-}
-
-INLINE carried carried_pick(mask here, carried yes, carried no) {
-    for (int i = 0; i < NUMBERS_OF(carried); ++i) ((real *)&no)[i] = pick(here, ((const real *)&yes)[i], ((real *)&no)[i]);
-    return no;
-}
-
-// What each sample of each pixel has for its next walk within the set.
-INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, world w) {
+// What each sample of each pixel has for its next walk within the set, from where it lands.
+INLINE void walk_seeded(stage s, const packet_pixels *at, carried *with, mask lands, world w) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce);
     const bits each = hash_bits(seed + (bits)((uint)s.sample * 0x85ebca6bu));
-    with->seed_low = real_of_bits(each & 0xffffu);
-    with->seed_high = real_of_bits(each >> 16);
+    with->seed_low = pick(lands, real_of_bits(each & 0xffffu), with->seed_low);
+    with->seed_high = pick(lands, real_of_bits(each >> 16), with->seed_high);
 }
 
 // Draws the flight of a path that sets out, with the numbers of a purpose.
@@ -43,65 +32,44 @@ INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, 
     flight_begins(with, so_far->through, u, choice, here);
 }
 
-// Ends paths that bring nothing, and after some bounces others by Russian roulette. `here`: those that have a way to go.
-INLINE void path_stays(stage s, path *so_far, mask here, real roulette, world w) {
-    here &= less(R(0.0), brightest(so_far->through));
-    if (s.bounce >= w.settings->roulette) here = wins_roulette(&so_far->through, fmin(brightest(so_far->through), R(0.95)), roulette, here);
-    so_far->on_path = number_of(here);
-}
-
 // One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
-// `behind`: in glass, whether the spot is seen from inside its body.
-INLINE light_ray path_asks(stage s, const packet_pixels *at, vec point, vec from, real own, const bsdf *b, real total, mask behind, world w, color *brings) {
+INLINE light_ray path_asks(stage s, const packet_pixels *at, const event *e, real total, world w, color *brings) {
     real numbers[ASKING_NUMBERS];
     path_asking(s, at, w, numbers);
-    const asked a = light_asked(point, from, b->normal, own, numbers, total, w);
+    const asked a = light_asked(e->point, e->from, e->normal, e->own, numbers, total, w);
     light_ray chosen = a.ray;
     real density;
     color scattered;
-    scatter_value(b, &chosen.toward, w.albedos, &scattered, &density);
-    *brings = color_scale(color_mul(scattered, chosen.light), asked_weight(&a, density));
-    mask dark = ~less(R(0.0), brightest(*brings));
+    event_value(e, chosen.toward, w, &scattered, &density);
+    *brings = asked_brings(&a, scattered, density);
+    mask dark = ~less(R(0.0), brightest(*brings)) | e->shut;
     // A body of glass hides what is behind its surface.
-    if (HAS(w, GLASS)) dark |= ~leads_out(chosen.toward, b->surface, behind);
+    if (HAS(w, GLASS)) dark |= ~e->in_medium & ~leads_out(chosen.toward, e->surface.surface, e->behind);
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
     // What nothing can block needs no march.
     chosen.distance = pick(~a.unblocked & ~dark, chosen.distance, R(-1.0));
     return chosen;
 }
 
-// Goes on in a direction that the surface chooses, unless roulette ends the path. The result says which
-// paths go below the boundary.
-INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const bsdf *b, world w) {
-    real u, v, choice, roulette;
+// Goes on in a direction that the event chooses, unless roulette ends the path. The result says which paths go below a boundary.
+INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, carried *with, const event *e, world w) {
+    real u, v, choice, roulette, wall = R(0.5), unused;
     path_square(s, at, PURPOSE_SCATTER, w, &u, &v);
     path_square(s, at, PURPOSE_CHOICES, w, &choice, &roulette);
-    real wall = R(0.5), unused;
-    if (b->relief) path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
-    so_far->direction = scatter_sample(b, choice, u, v, wall);
-    color value;
-    scatter_value(b, &so_far->direction, w.albedos, &value, &with->density);
-    mask on_path = mask_of(so_far->on_path) & less(R(0.0), with->density), sinks = on_path & ~on_path;
-    color part = color_scale(value, R(1.0) / with->density);
-    if (HAS(w, SUBSURFACE)) {
-        sinks = mask_of(so_far->on_path) & b->seen & less(R(1.0) - b->by_below, choice);
-        so_far->direction = vec_pick(sinks, hemisphere_direction(vec_scale(b->surface, R(-1.0)), u, v), so_far->direction);
-        part = color_pick(sinks, b->below, part);
-        on_path |= sinks;
-    }
-    so_far->through = color_pick(on_path, color_mul(so_far->through, part), so_far->through);
-    path_stays(s, so_far, on_path, roulette, w);
-    return sinks;
+    if (HAS(w, BUMP)) path_square(s, at, PURPOSE_WALL, w, &wall, &unused);
+    const onward found = event_sample(e, u, v, choice, wall, w);
+    const mask here = mask_of(so_far->on_path), on_path = here & found.goes;
+    so_far->direction = vec_pick(here, found.direction, so_far->direction);
+    with->density = pick(here, pick(e->shut, R(-1.0), found.density), with->density);
+    so_far->through = color_pick(on_path, color_mul(so_far->through, found.part), so_far->through);
+    so_far->on_path = number_of(path_stays(&so_far->through, roulette, s.bounce, w.settings->roulette, on_path));
+    return here & found.sinks;
 }
 
 // Adds what a path sees at its end: a lamp, or where it leaves the set what is past it.
-INLINE void path_ends(path *so_far, const carried *with, const lamp *before, mask leaves, real picture_y, world w) {
-    color past = light_past(so_far->direction, picture_y, so_far->origin, with->density, with->total, w);
-    const mask alone = less(with->density, R(0.0));
-    const real share = pick(alone, R(1.0), power_share(with->density, before->weight / with->total * before->density));
-    past = color_pick(before->met, color_scale(before->shows, share), past);
-    const color more = limited(color_mul(past, so_far->through), w.settings);
-    so_far->seen = color_pick(leaves | before->met, color_add(so_far->seen, more), so_far->seen);
+INLINE void path_ends(stage s, path *so_far, const carried *with, const lamp *before, mask leaves, real picture_y, world w) {
+    const color past = light_at_end(so_far->origin, so_far->direction, before, picture_y, with->density, with->total, w);
+    path_sees(s, so_far, color_mul(past, so_far->through), leaves | before->met, w);
 }
 
 // Adds what a spot shines with by itself.
@@ -111,8 +79,7 @@ INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *
         const real distance = vec_dot(vec_sub(here->seen, so_far->origin), so_far->direction);
         more = color_scale(more, emitter_share(so_far->origin, so_far->direction, distance, here->object, with->density, with->total, w));
     }
-    if (s.bounce > 0) more = limited(more, w.settings);
-    so_far->seen = color_pick(shows, color_add(so_far->seen, more), so_far->seen);
+    path_sees(s, so_far, more, shows, w);
 }
 
 // Adds the light of an object that the last ray of a path has met, as far as the path could also have asked for it.
@@ -122,8 +89,7 @@ INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, enc
     here &= less(R(0.0), brightest(light));
     if (!any_lane(here)) return;
     const real share = emitter_share(so_far->origin, so_far->direction, last.t, number, with->density, with->total, w);
-    const color more = limited(color_mul(color_scale(light, share), so_far->through), w.settings);
-    so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
+    path_sees(s, so_far, color_mul(color_scale(light, share), so_far->through), here, w);
 }
 
 // A spot's material, ready to scatter by the normal `shading`, which is the surface's own, or that of its relief. `behind`: in glass,
@@ -149,16 +115,12 @@ INLINE mask path_comes_out(int bounce, carried *with, spot *here, vec direction,
 }
 
 // How wide a path is from a spot on: as a pixel there, and as fast as the pixel grows before the first spot.
-INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, real time, world w) {
+INLINE void path_widens(stage s, path *so_far, const spot *here, ray from_eye, real time, mask lands, world w) {
     spot seen_first = *here;
     if (s.bounce > 0) seen_first = spot_kept(s, 0);
-    so_far->footprint = here->cone;
-    so_far->spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
-}
-
-// How far a path's ray goes to the spot that it has met.
-INLINE real way_to_spot(const spot *found, ray arrived) {
-    return pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+    const real spread = from_eye.spread + from_eye.footprint / fmax(depth_of(seen_first.seen, time, w.view), here->cone);
+    so_far->footprint = pick(lands, here->cone, so_far->footprint);
+    so_far->spread = pick(lands, spread, so_far->spread);
 }
 
 // Brings a path along its ray to what it has met, and says whether that is a spot: else it is a lamp, or all past the set, or a medium has
@@ -171,7 +133,7 @@ INLINE mask path_arrives(stage s, path *so_far, const carried *with, spot *found
     const mask lands = on_path & mask_of(found->found) & ~before.met;
     if (HAS(w, GLASS)) path_absorbs(so_far, with, far, on_path, w);
     if (s.bounce > 0) {
-        path_ends(so_far, with, &before, on_path & ~lands, picture_y, w);
+        path_ends(s, so_far, with, &before, on_path & ~lands, picture_y, w);
     } else {
         so_far->seen = color_pick(before.met, color_mul(before.shows, so_far->through), so_far->seen);
         spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), before.met);
@@ -188,37 +150,13 @@ INLINE carried carried_from_eye(vec eye, world w) {
     return with;
 }
 
-// What a path carries when it arrives. With media that scatter light it has been through `cross_media`; the result says which paths
-// these have halted.
-INLINE mask path_carries(stage s, path *so_far, carried *with, vec eye, world w) {
+// What a path carries when it arrives. With media that scatter light it has been through `cross_media`, which may have halted it.
+INLINE halt path_carries(stage s, path *so_far, carried *with, vec eye, world w) {
     const int crossed = KEEPS(s, STATE_HALT);
-    if (s.bounce > 0 || crossed) {
-        *with = carried_kept(s);
-    } else {
-        *with = carried_from_eye(eye, w);
-    }
-    if (!crossed) return less(R(1.0), R(0.0));
+    halt stop = {R(0.0), R(0.0), R(-1.0)};
+    *with = s.bounce > 0 || crossed ? carried_kept(s) : carried_from_eye(eye, w);
+    if (!crossed) return stop;
     if (s.bounce == 0) STATE_RECALL(s, *so_far, STATE_PATH);
-    halt stop;
     STATE_RECALL(s, stop, STATE_HALT);
-    return mask_of(stop.halted);
-}
-
-// Leaves paths that are `halted` as they are kept, with the ray by which they ask; and keeps how long rays that ask are.
-INLINE void path_halts(stage s, path *so_far, carried *with, ray *asks, mask halted, world w) {
-    halt stop;
-    STATE_RECALL(s, stop, STATE_HALT);
-    if (any_lane(halted)) {
-        path p;
-        STATE_RECALL(s, p, STATE_PATH);
-        *so_far = path_pick(halted, p, *so_far);
-        *with = carried_pick(halted, carried_kept(s), *with);
-        asks->origin = vec_pick(halted, p.origin, asks->origin);
-        asks->direction = vec_pick(halted, stop.toward, asks->direction);
-        asks->far = pick(halted, stop.far, asks->far);
-        asks->footprint = pick(halted, p.footprint * (real)(w.settings->shadow_detail), asks->footprint);
-    }
-    stop.halted = R(0.0);
-    stop.far = asks->far;
-    STATE_KEEP(s, stop, STATE_HALT);
+    return stop;
 }

@@ -5,3 +5,9 @@ INLINE mask wins_roulette(color *through, real stays, real chance, mask here) {
     *through = color_pick(goes_on, color_scale(*through, R(1.0) / stays), *through);
     return goes_on;
 }
+
+// Ends paths that bring nothing, and from the bounce `first` on others by what they bring.
+INLINE mask path_stays(color *through, real chance, int bounce, int first, mask here) {
+    here &= less(R(0.0), brightest(*through));
+    return bounce < first ? here : wins_roulette(through, fmin(brightest(*through), R(0.95)), chance, here);
+}

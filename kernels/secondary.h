@@ -3,6 +3,17 @@
 
 INLINE color limited(color c, march_record settings) { return color_limited(c, (real)(settings->firefly_limit)); }
 
+// Adds light to what a path has seen; after a bounce no more than the limit.
+INLINE void path_sees(stage s, path *so_far, color more, mask here, world w) {
+    if (s.bounce > 0) more = limited(more, w.settings);
+    so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
+}
+
+// How far a ray goes to the spot that it has met.
+INLINE real way_to_spot(const spot *found, ray arrived) {
+    return pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
+}
+
 // Sends the ray of a turn from a spot to where light may come from. `reaches`: how far it must be known what is met, see queue.h.
 INLINE void send_to_light(stage s, int turn, const spot *here, incidence in, real reaches, mask wanted, world w) {
     ray r;

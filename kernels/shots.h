@@ -27,16 +27,14 @@ INLINE void glance_begin(stage s, mask surface, color albedo, color seen, vec no
 
 // Keeps the light seen so far as that which was reflected once at most.
 INLINE void glance_once(stage s, color seen) {
-    glance look;
-    STATE_RECALL(s, look, STATE_GLANCE);
+    STATE_KEPT(s, glance, look, STATE_GLANCE);
     look.once = seen;
     STATE_KEEP(s, look, STATE_GLANCE);
 }
 
 // The shot at its end: what its path has seen, over the background; and what it has found first.
 INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
-    sighting first;
-    STATE_RECALL(s, first, STATE_SIGHTING);
+    STATE_KEPT(s, sighting, first, STATE_SIGHTING);
     spot found = *here;
     if (s.bounce > 0) found = spot_kept(s, 0);
     const color in_all = seen;
@@ -82,8 +80,7 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
         result = planes_into(result, seen, background, layers, a.time, w.view);
     }
     if (!KEEPS(s, STATE_GLANCE)) return result;
-    glance look;
-    STATE_RECALL(s, look, STATE_GLANCE);
+    STATE_KEPT(s, glance, look, STATE_GLANCE);
     result.of_light = parts_of(look, in_all, found.normal, comes, w);
     // Rays that meet nothing have seen what shines before it.
     const color past = color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past));

@@ -104,8 +104,7 @@ INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
 
 // Where the ray for a spot meets a face of the set before all else, that is the spot: such lanes are the result.
 INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
-    plane_face face;
-    STATE_RECALL(s, face, STATE_FACE);
+    STATE_KEPT(s, plane_face, face, STATE_FACE);
     const mask bare = less(R(0.0), face.number);
     if (!any_lane(bare)) return bare;
     here->found = pick(bare, R(1.0), here->found);

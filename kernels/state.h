@@ -9,6 +9,10 @@ INLINE mask on_face(const spot *here) { return is_face(here->object); }
 #define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
 typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
 
+// What has halted a path before what it had met.
+#define HALTED_BY_GLASS R(1.0)   // which has scattered it
+#define HALTED_BY_CLOUD R(2.0)   // of which it is left where it is scattered
+
 // Whether the scene needs a part.
 #define KEEPS(s, part) ((s).at[part] >= 0)
 

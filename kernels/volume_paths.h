@@ -4,7 +4,7 @@
 #include "roulette.h"
 #include "volume_bounds.h"
 #include "volume_track.h"
-#include "medium_light.h"
+#include "medium_event.h"
 
 // A path while it is followed.
 typedef struct {
@@ -40,9 +40,12 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     wander_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
     p->total = weight_of_all(p->origin, R(0.0), w);
     const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
-    const real g = (real)(w.settings->anisotropy);
-    asked a;
-    const color brings = medium_asks(p->origin, p->direction, g, numbers, p->total, w, &a);
+    const medium_event e = {p->direction, (real)(w.settings->anisotropy)};
+    const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
+    color value;
+    real density;
+    medium_value(&e, a.ray.toward, &value, &density);
+    const color brings = asked_brings(&a, value, density);
     const mask asks = here & less(R(0.0), brightest(brings));
     grid_ray to_light;
     real far;
@@ -51,10 +54,10 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     if (any_lane(crosses)) comes = track_through(to_light, far, crosses, random, w, looked);
     wander_adds(p, color_scale(brings, comes), bounce, asks, w);
     wander_square(at, sample, PURPOSE_SCATTER, bounce, w, &u, &v);
-    const vec onward = phase_direction(p->direction, u, v, g);
-    p->density = phase_of(vec_dot(p->direction, onward), g);
-    p->direction = vec_pick(here, onward, p->direction);
-    if (bounce >= w.settings->roulette) p->on_path = wins_roulette(&p->through, fmin(brightest(p->through), R(0.95)), roulette, p->on_path);
+    const onward next = medium_sample(&e, u, v);
+    p->density = next.density;
+    p->direction = vec_pick(here, next.direction, p->direction);
+    p->on_path = path_stays(&p->through, roulette, bounce, w.settings->roulette, p->on_path);
 }
 
 // The first thing that a path from the eye meets.
@@ -79,16 +82,10 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
         const mask met = track(g, far, crosses, &random, w, &number, &value, &shines, looked);
         if (w.settings->shines) wander_adds(p, shines, bounce, crosses, w);
         const mask ends = p->on_path & ~met;
-        color past = before.shows;
         if (bounce > 0) {
-            const real share = power_share(p->density, before.weight / p->total * before.density);
-            past = color_pick(before.met, color_scale(past, share),
-                              light_past(p->direction, picture_y, p->origin, p->density, p->total, w));
-        }
-        if (bounce > 0) {
-            wander_adds(p, past, bounce, ends, w);
+            wander_adds(p, light_at_end(p->origin, p->direction, &before, picture_y, p->density, p->total, w), bounce, ends, w);
         } else {
-            wander_adds(p, past, bounce, ends & before.met, w);
+            wander_adds(p, before.shows, bounce, ends & before.met, w);
             first.found = met | (before.met & ends);
             first.point = vec_along(p->origin, pick(met, distance_of(g, number, w), lamp_far), p->direction);
             first.value = pick(met, value, R(0.0));

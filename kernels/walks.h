@@ -47,9 +47,7 @@ INLINE void walk_flies(march *m, walk *a, mask here, world w) {
     a->object = pick(here, met, a->object);
     a->number = pick(here, number, a->number);
     stop = fmin(stop, met);
-    color unused;
-    real density, weight;
-    nearest_light(&m->r.origin, &m->r.direction, 0, &stop, &unused, &density, &weight, w);
+    lamp_met(m->r.origin, m->r.direction, 0, &stop, w);
     a->stop = pick(here, stop, a->stop);
     m->r.far = pick(here, (real)(REAL_LARGEST), m->r.far);
 }

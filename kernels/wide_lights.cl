@@ -1,15 +1,5 @@
 // Entry points: direct light that does not come from points. They know no formula.
-#include "stages.h"
-#include "environment.h"
-#include "sky.h"
-#include "phase.h"
-#include "spot.h"
-#include "set_lights.h"
-#include "light_places.h"
-#include "secondary.h"
-#include "fog.h"
-#include "look.h"
-#include "lit.h"
+#include "light_stages.h"
 #include "wide_lights.h"
 
 // Sends all rays that bring the spots' light.

@@ -160,11 +160,10 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, tally
 
 // Keeps what light a path meets before the surface, where it ends.
 INLINE void path_meets_light(stage s, const path *so_far, spot *found, ray arrived, world w) {
-    real far = pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
-    color shows = color_of(R(0.0), R(0.0), R(0.0));
-    real density = R(0.0), weight = R(0.0);
-    const mask met = mask_of(so_far->on_path) & nearest_light(&arrived.origin, &arrived.direction, s.bounce == 0, &far, &shows, &density, &weight, w);
-    const lamp_before there = {number_of(met), shows};
+    real far = way_to_spot(found, arrived);
+    const lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
+    const mask met = mask_of(so_far->on_path) & before.met;
+    const lamp_before there = {number_of(met), before.shows};
     STATE_KEEP(s, there, STATE_LAMP_BEFORE);
     spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), met);
 }

@@ -170,9 +170,9 @@ FLIGHT = _carried(
 HALT = _carried(
     "halt",
     "Where a medium has scattered a path before what it had met.",
-    ("real", "halted", "whether it has"),
-    ("vec", "toward", "where the ray goes that asks for light from there ..."),
-    ("real", "far", "... and how far; below 0: there is none. After spots: of each ray that asks"),
+    ("real", "halted", "which kind of medium has, see state.h; or 0"),
+    ("real", "anisotropy", "of a cloud, Henyey and Greenstein's g"),
+    ("real", "far", "after spots: how far the ray goes that asks for light; below 0: there is none"),
 )
 
 

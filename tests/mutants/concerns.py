@@ -38,7 +38,7 @@ kernels/objects.h: render/objects render/objects_light
 kernels/shape*: render/objects render/joined render/emitter_places
 kernels/object_grids.h: render/object_grids render/turned_grids
 kernels/clouds.h: render/clouds
-kernels/medium_light.h: render/clouds render/volume_paths
+kernels/medium_event.h: render/clouds render/volume_paths
 kernels/volume_bounds.h: render/volume_paths
 clfractal/renderers/transfer.py: render/clouds render/volume_paths voxels/blocks
 kernels/emitter*.h: render/emitter_places render/emitters
@@ -49,6 +49,7 @@ kernels/glass_paths.h: render/glass_paths render/glass_objects
 kernels/cloudy.h: render/cloudy
 kernels/bump.h: render/bump
 kernels/bsdf_bumped.h: render/bumped_materials
+kernels/events.h: render/clouds render/paths render/subsurface
 kernels/water.h: render/objects
 kernels/look.h: render/objects_light render/surface_light
 kernels/march_steps.h: render/searches

@@ -1,0 +1,12 @@
+// What stages include that bring light from sky and lights with a size.
+#include "stages.h"
+#include "environment.h"
+#include "sky.h"
+#include "phase.h"
+#include "spot.h"
+#include "set_lights.h"
+#include "light_places.h"
+#include "secondary.h"
+#include "fog.h"
+#include "look.h"
+#include "lit.h"
