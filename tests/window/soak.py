@@ -205,7 +205,6 @@ class Soak:
                 watch.turn()
                 faulthandler.cancel_dump_traceback_later()
                 self._look(viewer, watch, now - start)
-                viewer.finished = False  # a click may have closed it
                 if now > due:
                     due = now + self.random.uniform(3, 8)
                     self._upset(viewer, folder)
