@@ -59,10 +59,17 @@ class Body:
         Solids that are joined are a list that programs read. Of a scene with such solids only the formulas are text.
         `turns`: with the defines that depend on how formulas' turns repeat themselves.
         """
-        chains = self._chains
+        return self._text(alone=self.scene is None, turns=turns)
+
+    def possible_texts(self, *, turns: bool = False) -> list[dict[str, str]]:
+        """That text, and the one with simple solids where there are none, or of the formula by itself."""
+        return [self.texts(turns=turns), self._text(alone=self.scene is not None, turns=turns)]
+
+    def _text(self, *, alone: bool, turns: bool) -> dict[str, str]:
+        chains = (self.chain,) if alone else self._chains
         own = _turns(chains) if turns else {}
         lines = "".join(f"#define {name} {value}\n" for name, value in own.items())
-        text = write_formula(self.chain).text if self.scene is None else write_together(chains).text
+        text = write_formula(self.chain).text if alone else write_together(chains).text
         return {"formula.h": lines + text}
 
     def records(self, precision: Precision) -> Record:

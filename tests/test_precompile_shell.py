@@ -18,14 +18,14 @@ from clfractal.cli import run
 from clfractal.commands.shell import Shell
 from clfractal.device import program
 from clfractal.formulas import catalog
-from clfractal.work.precompile import library_scenes
+from clfractal.work.precompile import library_count, library_scenes
 from tests.long_renders import LIMIT_SECONDS
 from tests.shell import SCENE, Ended, InProcess, command, environment, process
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 TOLD = re.compile(r".*: (\d+) programs, (\d+) of them compiled now; [\d.]+ s, the cache has ([\d.]+) MB\n")
-# Scenes that take one small program each.
+# Scenes that take two small programs each.
 SCENES = {
     f"{name}.yaml": f"version: 1\nformula: {{name: {name}}}\ncamera: {{}}\nrenderer: {{type: cut_plane}}\n"
     for name in (
@@ -66,7 +66,8 @@ def test_the_last_line_tells_what_was_done(compiled: tuple[Path, Ended]) -> None
     assert (ended.status, ended.out) == (0, "")
     told = TOLD.fullmatch(ended.err.splitlines(keepends=True)[-1])
     assert told is not None, ended.err
-    assert int(told[1]) == int(told[2]) == len(SCENES)
+    # Each has one for the formula by itself, and one for what is joined to it.
+    assert int(told[1]) == int(told[2]) == 2 * len(SCENES)
     # Beside these the window has two.
     assert len(entries(folder)) == int(told[1]) + 2
     size = sum(path.stat().st_size for path in (folder / "cache" / "programs").iterdir())
@@ -118,6 +119,7 @@ def of_a_surface(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "coloring={by: trap, trap: {shape: sphere}}",
         "glow={by: trap}",
         "objects={ball: {type: sphere, position: [1.5, 0, 0], radius: 0.3}}",
+        "objects={ball: {type: sphere, position: [1, 0, 0], radius: 0.3, join: smooth_union}}",
         "cut_planes=[{plane: {center: [0, 0, 0], normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]",
     ],
 )
@@ -192,6 +194,9 @@ def test_an_interrupt_keeps_what_is_done(tmp_path: Path) -> None:
 
 def test_the_library_has_every_formula_and_scene() -> None:
     files = sorted(resources.folder("scenes").glob("*.yaml"))[:2]
-    found = [scene.formula.name for scene in library_scenes(files)]
-    assert found[:-2] == list(catalog.names())
-    assert len(found) == len(catalog.names()) + 2
+    found = list(library_scenes(files))
+    assert len(found) == library_count(files)
+    plain = {(scene.formula.name, scene.renderer.type) for scene in found[:-2]}
+    assert plain == {
+        (name, renderer) for name in catalog.names() for renderer in ("surface", "cut_plane", "volume")
+    }

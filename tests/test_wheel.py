@@ -27,6 +27,7 @@ def test_what_travels_in_the_wheel(wheel: Path) -> None:
         (ROOT / "scenes", "*.yaml", "clfractal/scenes"),
         (ROOT / "clfractal" / "formulas" / "library", "*.yaml", "clfractal/formulas/library"),
         (ROOT / "clfractal" / "environments", "*.exr", "clfractal/environments"),
+        (ROOT / "clfractal" / "tables", "*.npy", "clfractal/tables"),
         (ROOT / "clfractal", "*.py", "clfractal"),
     ):
         files = {f"{inside}/{path.relative_to(place)}" for path in place.rglob(pattern) if path.is_file()}

@@ -28,7 +28,7 @@ from clfractal.files import system
 SIZE_VARIABLE = "CLFRACTAL_CACHE_MB"
 """Megabytes that compiled programs may take in the cache; 0: none is kept."""
 USUAL_MEGABYTES = 500
-"""A program has some 200 to 500 KB: all that a library of scenes needs are 100 MB."""
+"""A program has some 200 to 500 KB: all that the library of formulas and scenes may need are 140 MB."""
 _MEGABYTE = 1_000_000
 _MOST_MEGABYTES = 1_000_000
 

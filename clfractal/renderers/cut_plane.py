@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.renderers.carried import carried_text
@@ -23,16 +25,17 @@ def renderer_of(scene: Scene) -> CutPlaneRenderer:
     return scene.renderer
 
 
-def program_text(scene: Scene, plan: Plan) -> FlatText:
-    """The whole text of the scene's program."""
-    body = Body.of(scene)
+def program_text(scene: Scene, plan: Plan, formula: Mapping[str, str] | None = None) -> FlatText:
+    """The whole text of the scene's program, or with another text of the formula."""
+    if formula is None:
+        formula = Body.of(scene).texts(turns=True)
     structs = "".join(struct.c_text() for struct in (VIEW, SAMPLING, ORBIT, CUT_PLANE))
     defines = {
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
     }
     generated = {
-        **body.texts(turns=True),
+        **formula,
         "structs.h": structs,
         "carried.h": carried_text(),
     }
@@ -49,7 +52,13 @@ class CutPlaneKernel(TileKernel):
         return False
 
     def texts(self) -> list[ProgramText]:
-        return [ProgramText(self.name, program_text(self.scene, self.plan), (self.name,))]
+        return [self._program()]
+
+    def possible_texts(self) -> list[ProgramText]:
+        return [self._program(formula) for formula in Body.of(self.scene).possible_texts(turns=True)]
+
+    def _program(self, formula: Mapping[str, str] | None = None) -> ProgramText:
+        return ProgramText(self.name, program_text(self.scene, self.plan, formula), (self.name,))
 
     def own_arguments(self) -> list[KernelArgument]:
         scene, precision = self.scene, self.precision

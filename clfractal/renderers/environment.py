@@ -170,8 +170,11 @@ def _maxima(values: Doubles, cells: int) -> Doubles:
     left, part, start, step = _borders(values, cells)
     at_borders = start + part * step
     # Every cell holds the middle of a pixel, since there are no more cells than pixels.
-    first = left[:-1] + (part[:-1] > 0)
-    inside = np.maximum.reduceat(values[..., :-1], first, axis=-1)
+    if values.shape[-1] - 2 == 2 * cells:  # of a sky
+        inside = np.maximum(values[..., 1:-1:2], values[..., 2:-1:2])
+    else:
+        first = left[:-1] + (part[:-1] > 0)
+        inside = np.maximum.reduceat(values[..., :-1], first, axis=-1)
     found: Doubles = np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:]))
     return found
 

@@ -31,6 +31,7 @@ from clfractal.renderers.scattering import (
     Floats,
     mean_albedo,
     mirrored,
+    read_table,
     shadow,
     table_cosines,
     visible_normals,
@@ -46,10 +47,13 @@ _SEEN = (380.0, 720.0)
 
 @cache
 def glass_tables() -> Floats:
-    """The buffer, float32, one-dimensional."""
-    found = np.concatenate([glass_albedos().reshape(-1), wavelengths().reshape(-1)]).astype(np.float32)
-    found.flags.writeable = False
-    return found
+    """The buffer, float32, one-dimensional; it travels with the program."""
+    return read_table("glass")
+
+
+def found_glass() -> Floats:
+    """What `glass_tables` reads, by quadrature: 0.3 s."""
+    return np.concatenate([glass_albedos().reshape(-1), wavelengths().reshape(-1)]).astype(np.float32)
 
 
 def glass_albedos() -> Doubles:

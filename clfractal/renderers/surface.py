@@ -223,7 +223,7 @@ def _structs() -> dict[str, str]:
 
 
 def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list[ProgramText]:
-    """The texts of the programs whose stages the scene launches, or of all."""
+    """The texts of the programs whose stages the scene launches, or of all, with joined solids and without."""
     body = Body.of(scene)
     launched = {stage.kernel for stage in surface_stages(scene, plan, (0, 1))}
     defines = cache(lambda of: of(scene, plan))
@@ -233,9 +233,10 @@ def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list
             continue
         # All that there are: what is kept of a program has every kernel that any scene may launch.
         kernels = tuple(name for name in each.kernels if plan.lanes == 1 or name not in OF_SINGLE_LANES)
-        generated = _structs()
+        formulas: list[dict[str, str]] = [{}]
         if each.formula:
-            generated = {**body.texts(turns=each.turns), **generated}
-        flat = flat_text(each.entry, generated=generated, defines=defines(each.defines))
-        texts.append(ProgramText(each.name, flat, kernels))
+            formulas = body.possible_texts(turns=each.turns) if all_stages else [body.texts(turns=each.turns)]
+        for formula in formulas:
+            flat = flat_text(each.entry, generated={**formula, **_structs()}, defines=defines(each.defines))
+            texts.append(ProgramText(each.name, flat, kernels))
     return texts

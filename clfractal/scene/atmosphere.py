@@ -260,7 +260,7 @@ class Atmosphere:
         return found
 
     def _look_up(self, height: Doubles, mu: Doubles) -> Singles:
-        """The table of many scatterings, blended linearly, shape (wavelengths, ...); `height` has the steps alone."""
+        """The table of many scatterings, blended linearly, shape (wavelengths, ...); `height` has no azimuths."""
         row = np.sqrt(np.clip(height.reshape(-1) / self._heights[-1], 0, 1)) * (_LEVELS - 1)
         column = (np.arcsin(mu) / (pi / 2) + 0.5) / 1.5 * (_SUNS - 1)
         column = np.clip(column, 0, _SUNS - 1)
@@ -269,7 +269,7 @@ class Atmosphere:
         down, right = (row - upper)[:, None], (column - left).astype(np.float32)
         at_heights = self._many[:, upper] * (1 - down) + self._many[:, upper + 1] * down
         table = at_heights.astype(np.float32).reshape(len(WAVELENGTHS), -1)
-        place = left + _SUNS * np.arange(len(row))
+        place = left + _SUNS * np.arange(len(row)).reshape(height.shape)
         first, second = np.take(table, place, axis=1), np.take(table, place + 1, axis=1)
         found: Singles = first * (1 - right) + second * right
         return found

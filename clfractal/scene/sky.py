@@ -40,7 +40,7 @@ SUNLIGHT = 4.973
 EYE = EARTH + 0.05
 """Where the sky is seen from: 50 m above the ground, so that the horizon lies 0.2 degrees below the level."""
 _ROWS, _AZIMUTHS = 96, 49
-_ROWS_AT_ONCE = 16
+_ROWS_AT_ONCE, _RAYS_AT_ONCE = 16, 4
 
 Floats = npt.NDArray[np.float32]
 
@@ -123,10 +123,11 @@ class _Parts:
         """At elevations `rows` between `ends`, the horizon first: blended from a grid that is fine there."""
         around = np.linspace(0, pi, _AZIMUTHS)
         grid = ends[0] + np.linspace(0, 1, _ROWS) ** 2 * (ends[1] - ends[0])
-        found = in_threads(lambda row: air.scattered(EYE, np.sin(row)[None], around, sun), [*grid])
+        some = np.sin(grid).reshape(-1, _RAYS_AT_ONCE, 1)
+        found = in_threads(lambda mu: air.scattered(EYE, mu, around, sun), [*some])
         place = np.sqrt(np.clip((rows - ends[0]) / (ends[1] - ends[0]), 0, 1)) * (_ROWS - 1)
         parts = [
-            to_rgb(np.stack(part))
+            to_rgb(np.concatenate(part))
             for part in zip(*((each.molecules, each.aerosol, each.many) for each in found), strict=True)
         ]
         light = _between(np.concatenate(parts, axis=-1), place).swapaxes(1, 2)

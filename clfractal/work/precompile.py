@@ -24,6 +24,19 @@ from clfractal.work.show import Shower
 from clfractal.work.thumbnails import shown_scene
 
 _LOOK_SECONDS = 0.05
+_OPACITY = [{"at": 0, "opacity": 0}, {"at": 9, "opacity": 1}]
+# Of a volume each kind of values has programs that ask the formula. (Those of other than gradient normals take longest to
+# compile, and are left to the scenes that have them.)
+_KINDS: tuple[dict[str, object], ...] = (
+    {},
+    {"renderer": {"type": "cut_plane"}},
+    {"renderer": {"type": "volume", "value": "inside"}},
+    {"renderer": {"type": "volume", "value": "coverage"}},
+    {
+        "renderer": {"type": "volume", "value": "iterations", "transfer": {"opacity": _OPACITY}},
+        "lighting": {"mode": "path"},
+    },
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -162,12 +175,13 @@ class Precompilation:
 
 def library_count(files: Collection[Path]) -> int:
     """How many scenes `library_scenes` gives."""
-    return len(catalog.names()) + len(files)
+    return len(catalog.names()) * len(_KINDS) + len(files)
 
 
 def library_scenes(files: Iterable[Path]) -> Iterator[Scene]:
-    """A plain scene of each formula of the library, and the scenes of files."""
+    """Plain scenes of each formula of the library, one of each kind, and the scenes of files."""
     for name in catalog.names():
-        yield load_scene({"version": 1, "formula": {"name": name}, "camera": {}})
+        for kind in _KINDS:
+            yield load_scene({"version": 1, "formula": {"name": name}, "camera": {}, **kind})
     for file in files:
         yield load_scene(file)

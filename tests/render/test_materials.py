@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from clfractal.renderers.glass import found_glass, glass_tables
 from clfractal.renderers.scattering import COSINES as COSINES_OF_TABLES
-from clfractal.renderers.scattering import ROUGHNESSES, albedo_tables, fresnel
+from clfractal.renderers.scattering import ROUGHNESSES, albedo_tables, found_albedos, fresnel
 from tests.render.lobes import COSINES, LOBES, NO_GLOSS, Floats, hemisphere, material, numbers, toward
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
@@ -126,3 +127,12 @@ def test_tables_are_albedos() -> None:
     assert table[: 4 * ROUGHNESSES * (COSINES_OF_TABLES + 1)].min() >= 0
     table = table[4 * ROUGHNESSES * (COSINES_OF_TABLES + 1) :]
     assert 0 <= table.min() <= table.max() <= 1
+
+
+def test_tables_that_travel_with_the_program_are_what_is_found() -> None:
+    """But for what libraries of mathematics differ in."""
+    for kept, found in ((albedo_tables(), found_albedos()), (glass_tables(), found_glass())):
+        assert kept.dtype == found.dtype
+        assert kept.shape == found.shape
+        assert np.abs(kept - found).max() < 1e-6
+        assert not kept.flags.writeable
