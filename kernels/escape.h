@@ -84,8 +84,9 @@ CALLED void other_escape(const vec *point, const mask *active, int smooth, int p
     *found = escape_by(0, *point, *active, smooth, periodicity, most, orbit, k);
 }
 
+#define USUAL_ESCAPE(usual) case usual: return escape_by(usual, point, active, smooth, periodicity, most, orbit, k);
 INLINE escaped formula_escape(vec point, mask active, int smooth, int periodicity, int most, orbit_record orbit, constants k) {
-    if (has_usual_values(k)) return escape_by(1, point, active, smooth, periodicity, most, orbit, k);
+    USUALLY(USUAL_ESCAPE)
     escaped found;
     other_escape(&point, &active, smooth, periodicity, most, &found, orbit, k);
     return found;

@@ -98,7 +98,7 @@ INLINE void march_measure(march *m, sight *s, int goal, march_record settings) {
     s->restless = free & close & less(m->radius_before + CALM_GROWTH * growth, s->radius);
     s->blind = less(R(1.0), R(0.0));
     s->sure = s->radius;
-    if (JOINED) march_blind(m, s, settings);
+    if (HOLLOWS) march_blind(m, s, settings);
     s->near = pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));

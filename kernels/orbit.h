@@ -2,7 +2,8 @@
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
 // LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, dual_start, apply,
-// apply_derivative and dual_apply (each also as ..._by), has_usual_values, state_pick, dual_state_pick, state_square, solid_distance.
+// apply_derivative and dual_apply (each also as ..._by), has_usual_values and its answers beside 0 (EACH_USUAL), state_pick,
+// dual_state_pick, state_square, solid_distance.
 // Of several formulas they are of the one whose constants are given, and what these do not have in common is read from its `orbit`.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
@@ -72,7 +73,9 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, orbit_record o
 }
 
 // Orbits are written for the `usual` values of a formula's exponents and conditions, which are literals then, and for any: a branch
-// around the whole orbit, since what others call moves all registers into memory.
+// around the whole orbit, since what others call moves all registers into memory. Of several formulas each has an orbit of its own for
+// its usual values, or branches within would move its state, too.
+#define USUALLY(DO) switch (has_usual_values(k)) { EACH_USUAL(DO) }
 
 // Which points belong to the solid of `limit` applications: the inside of the distances below, without the distance. The
 // solids of fewer applications hold those of more (but for an orbit that comes back from beyond the distance bailout).
@@ -98,8 +101,9 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_reco
     return (orbit_end){count, alive};
 }
 
+#define USUAL_END(usual) case usual: return end_by(usual, point, active, limit, orbit, k);
 INLINE orbit_end formula_end(vec point, mask active, int limit, orbit_record orbit, constants k) {
-    if (has_usual_values(k)) return end_by(1, point, active, limit, orbit, k);
+    USUALLY(USUAL_END)
     return end_by(0, point, active, limit, orbit, k);
 }
 
@@ -160,8 +164,10 @@ CALLED void other_dual_distance(const vec *point, const mask *active, int of, cl
                                 orbit_record orbit, constants k) {
     *found = dual_distance_by(0, *point, *active, of, orbit, k, surface);
 }
+
+#define USUAL_DUAL_DISTANCE(usual) case usual: return dual_distance_by(usual, point, active, of, orbit, k, surface);
 INLINE clearance formula_dual_distance(vec point, mask active, int of, orbit_record orbit, constants k, surface_point *surface) {
-    if (has_usual_values(k)) return dual_distance_by(1, point, active, of, orbit, k, surface);
+    USUALLY(USUAL_DUAL_DISTANCE)
     clearance found;
     other_dual_distance(&point, &active, of, &found, surface, orbit, k);
     return found;
@@ -239,8 +245,9 @@ INLINE clearance scalar_distance_by(int usual, vec point, mask active, orbit_rec
     return scalar_orbit_end(&o, active, orbit, k);
 }
 
+#define USUAL_DISTANCE(usual) case usual: return scalar_distance_by(usual, point, active, orbit, k);
 INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {
-    if (has_usual_values(k)) return scalar_distance_by(1, point, active, orbit, k);
+    USUALLY(USUAL_DISTANCE)
     return scalar_distance_by(0, point, active, orbit, k);
 }
 
@@ -269,9 +276,10 @@ CALLED void other_scalar_distances(const vec *points, const mask *active, cleara
     scalar_distances_by(0, points, active, found, orbit, k);
 }
 
+#define USUAL_DISTANCES(usual) case usual: scalar_distances_by(usual, points, active, found, orbit, k); return;
 INLINE void formula_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
-    if (has_usual_values(k)) scalar_distances_by(1, points, active, found, orbit, k);
-    else other_scalar_distances(points, active, found, orbit, k);
+    USUALLY(USUAL_DISTANCES)
+    other_scalar_distances(points, active, found, orbit, k);
 }
 #else
 INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {

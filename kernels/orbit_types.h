@@ -52,6 +52,7 @@ typedef struct {
     real share;
     orbit_told other;
 } surface_point;
+#define SURFACE_ALONE (3 + NUMBERS_OF(orbit_told))  // numbers of it where nothing flows
 
 // Whose gradient is asked for: the distance's, of the last z; or that of the surface which is shown.
 #define OF_DISTANCE 0

@@ -25,17 +25,25 @@ INLINE surface_point surface_flowing(surface_point all, surface_point more, mask
     return found;
 }
 
+// Of two surfaces that of `more` where it `counts`. Where nothing flows no surface has another one beside it.
+INLINE void surface_replace(orbit_record o, surface_point *all, mask counts, surface_point more) {
+    real *numbers = (real *)all;
+    for (int i = 0; i < SURFACE_ALONE; ++i) numbers[i] = pick(counts, ((const real *)&more)[i], numbers[i]);
+    if (!o->flows) return;
+    for (int i = SURFACE_ALONE; i < NUMBERS_OF(surface_point); ++i) numbers[i] = pick(counts, ((const real *)&more)[i], numbers[i]);
+}
+
 // In a hollow what is joined to it later counts as the nearest this near: a part of the radius of its ball.
 #define HOLLOW_NEAR R(0.1)
 
 INLINE mask in_hollow(solid_found found) { return less(found.far, found.most); }
 
 // Cuts a formula's set out.
-INLINE void solid_hollow(solid_found *all, solid_found more) {
+INLINE void solid_hollow(orbit_record o, solid_found *all, solid_found more) {
     const real all_of_it = (real)(REAL_LARGEST), wall = pick(more.inside, all_of_it, -more.far);
     more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
     const mask counts = all->inside & less(all->far, wall);
-    all->surface = surface_point_pick(counts, more.surface, all->surface);
+    surface_replace(o, &all->surface, counts, more.surface);
     all->scale = pick(counts, more.scale, all->scale);
     all->far = fmax(all->far, pick(more.inside, R(0.0), -more.far));
     all->most = pick(more.inside, all_of_it, fmax(all->most, -more.far));
@@ -60,7 +68,7 @@ INLINE real nearest_before(orbit_record o, const solid_found *all) {
 // Joins one more solid to those before it. `rounding`: what a place is not known better than.
 INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real rounding) {
     if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
-        solid_hollow(all, more);
+        solid_hollow(o, all, more);
         return;
     }
     if (o->join == JOIN_CUT) {
@@ -80,7 +88,7 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
             more.surface.other = all->surface.other;
             more.surface.own.solid = more.surface.other.solid = wall_of;
         }
-        all->surface = surface_point_pick(counts, more.surface, all->surface);
+        surface_replace(o, &all->surface, counts, more.surface);
         all->scale = pick(counts, more.scale, all->scale);
         FOLDED(fmax)
         all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
@@ -105,7 +113,7 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));
         return;
     }
-    all->surface = surface_point_pick(nearer, more.surface, all->surface);
+    surface_replace(o, &all->surface, nearer, more.surface);
     all->scale = pick(nearer, more.scale, all->scale);
     FOLDED(fmin)
     all->inside |= more.inside;

@@ -35,7 +35,13 @@ class Facts:
             f"#define HAS_DERIVATIVE {int(self.has_derivative)}\n"
             f"#define HAS_SHAPE {int(self.has_shape)}\n"
             f"#define HAS_CALLS {int(self.has_calls)}\n"
+            f"{each_usual(1)}"
         )
+
+
+def each_usual(formulas: int) -> str:
+    """What `has_usual_values` may say: 1 for the usual values of the first formula, 2 for the second's, and so on."""
+    return f"#define EACH_USUAL(DO) {' '.join(f'DO({which + 1})' for which in range(formulas))}\n"
 
 
 def state_functions(size: int) -> str:

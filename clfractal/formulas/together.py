@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import lru_cache
 
-from clfractal.formulas.functions import Facts, state_functions
+from clfractal.formulas.functions import Facts, each_usual, state_functions
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, Leaf, write_formula
 
@@ -16,7 +16,6 @@ from clfractal.formulas.opencl import FormulaText, Leaf, write_formula
 _ASKED = (
     ("void", "start", "vec point", "state *c, state *z"),
     ("void", "dual_start", "vec point", "dual_state *c, dual_state *z"),
-    ("int", "has_usual_values", "", ""),
     ("state", "apply_by", "int usual, int n, state z, state c", ""),
     ("state", "apply", "int n, state z, state c", ""),
     ("dual_state", "dual_apply_by", "int usual, int n, dual_state z, dual_state c", ""),
@@ -74,6 +73,7 @@ def write_together(chains: tuple[Chain, ...]) -> Together:
             _facts([leaf.facts for leaf in leaves]),
             state_functions(width),
             *(leaf.text for leaf in leaves),
+            _usual(len(leaves)),
             *(_choice(len(leaves), *each) for each in asked),
         ]
     )
@@ -106,13 +106,28 @@ def _facts(each: list[Facts]) -> str:
     return "".join(f"#define {name} {value}\n" for name, value in values.items())
 
 
+def _usual(leaves: int) -> str:
+    """Whether the formula whose constants are given has its usual values, and which it is: what orbits are written for."""
+    names = [f"{_name(leaf)}has_usual_values(k)" for leaf in range(leaves)]
+    lines = [
+        f"    if ((int)k[-1] == {leaf}) {{ return {names[leaf]} ? {leaf + 1} : 0; }}\n"
+        for leaf in range(1, leaves)
+    ]
+    return (
+        f"{each_usual(leaves)}INLINE int has_usual_values(__constant const scalar *k) {{\n"
+        f"{''.join(lines)}    return {names[0]};\n}}\n"
+        "INLINE int leaf_of(int usual, __constant const scalar *k) { return usual ? usual - 1 : (int)k[-1]; }\n"
+    )
+
+
 def _choice(leaves: int, answer: str, function: str, before: str, behind: str) -> str:
     """The function of the formula whose constants are given."""
     parameters = ", ".join(filter(None, (before, "__constant const scalar *k", behind)))
     passed = ", ".join(each.split()[-1].lstrip("*") for each in parameters.split(", "))
     returned, ended = ("", " return;") if answer == "void" else ("return ", "")
+    asked = "leaf_of(usual, k)" if "usual" in before else "(int)k[-1]"
     lines = [
-        f"    if ((int)k[-1] == {leaf}) {{ {returned}{_name(leaf)}{function}({passed});{ended} }}\n"
+        f"    if ({asked} == {leaf}) {{ {returned}{_name(leaf)}{function}({passed});{ended} }}\n"
         for leaf in range(1, leaves)
     ]
     lines.append(f"    {returned}{_name(0)}{function}({passed});\n")
