@@ -96,8 +96,8 @@ INLINE pbr pbr_found(stage s, const spot *here, world w) {
         const real quantity = is_colored_at_once(w.material) ? here->smooth : here->quantity;
         other.object = here->other;
         one.share = other.share = R(0.0);
-        one.tint = object_color(&here->normal, quantity, one.object, w);
-        other.tint = object_color(&here->normal, quantity, other.object, w);
+        one.tint = object_color(here->normal, quantity, one.object, w);
+        other.tint = object_color(here->normal, quantity, other.object, w);
         pbr_mix mix = {0};
         pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
         pbr_add(&mix, pbr_at(s, &other, w), here->share, w);

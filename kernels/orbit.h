@@ -168,8 +168,13 @@ CALLED void other_dual_distance(const vec *point, const mask *active, int of, cl
 #define USUAL_DUAL_DISTANCE(usual) case usual: return dual_distance_by(usual, point, active, of, orbit, k, surface);
 INLINE clearance formula_dual_distance(vec point, mask active, int of, orbit_record orbit, constants k, surface_point *surface) {
     USUALLY(USUAL_DUAL_DISTANCE)
+    // What a call may write to stays in memory, also where it is not called: it is given copies.
+    const vec at = point;
+    const mask lanes = active;
     clearance found;
-    other_dual_distance(&point, &active, of, &found, surface, orbit, k);
+    surface_point own = *surface;
+    other_dual_distance(&at, &lanes, of, &found, &own, orbit, k);
+    *surface = own;
     return found;
 }
 

@@ -21,8 +21,8 @@ INLINE mask faces(stage s, const spot *here, vec direction, world w) {
 
 // The colour of a thing: the set's, or that of the object with this number. The face of an object's cut shows the plane's colour of
 // insides; what that of the set's shows only the formula knows.
-CALLED color object_color(const vec *normal, real quantity, real object, world w) {
-    color found = surface_color(*normal, quantity, w.material, w.palette);
+INLINE color object_color(vec normal, real quantity, real object, world w) {
+    color found = surface_color(normal, quantity, w.material, w.palette);
     const real plane = plane_of_face(object);
     for (int i = 0; i < w.planes.count; ++i) found = color_pick(equal(plane, (real)((scalar)i)), color_splat(w.planes.planes[i].inside), found);
     for (int i = 0; i < w.settings->object_count; ++i) {
@@ -34,8 +34,8 @@ CALLED color object_color(const vec *normal, real quantity, real object, world w
 
 // The colour of a spot: where two solids flow together, a blend of theirs.
 INLINE color spot_color(vec normal, real quantity, real object, real other, real share, world w) {
-    const color own = object_color(&normal, quantity, object, w);
-    if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(&normal, quantity, other, w), share);
+    const color own = object_color(normal, quantity, object, w);
+    if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(normal, quantity, other, w), share);
     return own;
 }
 

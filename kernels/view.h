@@ -3,8 +3,9 @@
 // All fields of the struct are as wide as a number, or fill up one.
 #define POSE_NUMBERS ((int)(sizeof(struct View) / sizeof(scalar)))
 
-// Called, since every ray from the eye asks for dozens of numbers, and the loop would stand in the text as often.
-CALLED real view_number_at(__constant const scalar *number, real time, int spans) {
+// Called, since every ray from the eye asks for dozens of numbers, and the loop would stand in the text as often; and cold, or each of
+// these branches would move registers into memory for it.
+CALLED __attribute__((cold)) real view_number_at(__constant const scalar *number, real time, int spans) {
     scalar each[LANES];
     lanes_store(time * (real)((scalar)spans), each);
     for (int lane = 0; lane < LANES; ++lane) {
