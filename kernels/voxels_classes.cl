@@ -28,7 +28,6 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
 #endif
     neighbourhood n;
     load_neighbourhood(&n, samples, &around, extent);
-    const float whole = SOURCE == SOURCE_BITS ? 1.0f : extent->whole;
     bool some = false, all = true;
     for (int z = 0; z < BRICK_SIDE; ++z) {
         for (int y = 0; y < BRICK_SIDE; ++y) {
@@ -37,14 +36,18 @@ __kernel void classify_bricks(__global uchar *classes, __global const ulong *bri
             for (n.own = 0; n.own < BRICK_SIDE; ++n.own) {
                 const float value = row_window(&r, 0);
                 some |= value != 0.0f;
-                all &= value >= whole;
+                all &= value >= (SOURCE == SOURCE_BITS ? 1.0f : extent->whole);
             }
+#elif SOURCE == SOURCE_BITS
+            const uint own = (r >> VOXELS_BEFORE) & 0x1ff;
+            some |= own != 0;
+            all &= own == 0x1ff;
 #else
             float nine[16];
             vstore16(row_window(&r, 0), 0, nine);
             for (int x = 0; x < BRICK_SIDE; ++x) {
                 some |= nine[x] != 0.0f;
-                all &= nine[x] >= whole;
+                all &= nine[x] >= extent->whole;
             }
 #endif
         }
