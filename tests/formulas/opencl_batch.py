@@ -17,7 +17,8 @@ from clfractal.resources import folder
 from tests.small_kernels import Floats, SmallKernels
 
 _DEFINED = re.compile(
-    r"^(?:(?:INLINE|CALLED) \w+|__kernel void|#define|#undef) (\w+)|^(?:\}|typedef [\w(), ]+) (\w+);|^STAGE\((\w+)\)",
+    r"^(?:(?:INLINE|CALLED)(?: __attribute__\(\(\w+\)\))? \w+|__kernel void|#define|#undef) (\w+)"
+    r"|^(?:\}|typedef [\w(), ]+) (\w+);|^STAGE\((\w+)\)",
     re.MULTILINE,
 )
 _INCLUDES = re.compile(
