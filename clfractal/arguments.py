@@ -1,4 +1,4 @@
-"""Checks of what Python programs pass: errors of one line that name the argument, as the shell's name the option.
+"""Checks of what Python programs pass: errors of one line that name the argument.
 
 NumPy's numbers are taken wherever Python's are.
 """

@@ -1,4 +1,4 @@
-"""Errors a user can act on: each has a message of one line, the place of the mistake, and the shell's exit status."""
+"""Errors a user can act on: one line each, with the place of the mistake and the shell's exit status."""
 
 from __future__ import annotations
 

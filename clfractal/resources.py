@@ -1,4 +1,4 @@
-"""What is installed: the program's version, and its data, which are kernels, scenes and the formula library."""
+"""What is installed: the program's version, kernels, scenes and the formula library."""
 
 from __future__ import annotations
 

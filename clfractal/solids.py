@@ -1,4 +1,4 @@
-"""Several formulas and simple solids that are joined to one: their records and texts, see `kernels/solids.h`."""
+"""Several formulas and simple solids that are joined to one: their records and texts."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-// The same by the other search for the surface.
+// Entry points that know the formula: rays of a queue are marched by steps, the other search for the surface.
 #include "orbits.h"
 #include "rays.h"
 #include "march_steps.h"

@@ -9,6 +9,7 @@ from __future__ import annotations
 import inspect
 import json
 import os
+import posixpath
 import re
 import shlex
 from pathlib import Path
@@ -31,7 +32,8 @@ from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.viewer import settings
 from clfractal.work import frames
-from tests.document import DOCS, code, section, table, text
+from tests.document import DOCS, PAGES, code, section, table, text
+from tests.makers import maker
 from tests.shell import SCENE, InProcess
 
 PACKAGE = Path(clfractal.__file__).resolve().parent
@@ -442,9 +444,9 @@ def test_the_python_api_is_described() -> None:
 # --- all pages ---
 
 
-@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
+@pytest.mark.parametrize("page", PAGES)
 def test_files_that_a_page_names_exist(page: str) -> None:
-    """`clfractal/optics/view.py`, `kernels/march.h`: an architecture page outlives its files only too easily."""
+    """`clfractal/optics/view.py`, `kernels/march.h`: a page for engineers outlives its files only too easily."""
     named = set(re.findall(r"`((?:clfractal|kernels|tests|benchmarks|scenes)/[\w./]+\.\w+)`", text(page)))
     assert [name for name in sorted(named) if not os.path.exists(DOCS.parent / name)] == []
 
@@ -455,14 +457,29 @@ def anchors(page: str) -> set[str]:
     return {re.sub(r"[^\w -]", "", heading).strip().lower().replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", sorted(path.name for path in DOCS.glob("*.md")))
-def test_links_to_headings(page: str) -> None:
-    links = re.findall(r"\]\(([\w-]+\.md)?#([^)]+)\)", text(page))
-    assert [link for link in links if link[1] not in anchors(link[0] or page)] == []
+@pytest.mark.parametrize("page", PAGES)
+def test_links_to_pages_and_headings(page: str) -> None:
+    for name, heading in re.findall(r"\]\(([\w./-]+\.md)?(?:#([^)]+))?\)", text(page)):
+        linked = posixpath.normpath(posixpath.join(posixpath.dirname(page), name)) if name else page
+        assert (DOCS / linked).is_file(), linked
+        assert not heading or heading in anchors(linked), (linked, heading)
 
 
-def test_every_module_has_its_place_in_the_architecture() -> None:
-    page = text("architecture.md")
-    modules = [path for path in PACKAGE.rglob("*.py") if path.name not in ("__init__.py", "__main__.py")]
-    kernels = [path for path in (DOCS.parent / "kernels").rglob("*") if path.is_file()]
-    assert [path.name for path in modules + kernels if f"`{path.name}`" not in page] == []
+# --- what files say of themselves ---
+
+
+def test_the_list_of_modules_is_what_the_files_say() -> None:
+    made = maker("make_modules").page()
+    assert (DOCS / "engineering" / "modules.md").read_text("utf-8") == made, "run docs/make_modules.py"
+    files = [path for path in PACKAGE.rglob("*.py") if path.name not in ("__init__.py", "__main__.py")]
+    files += [path for path in (DOCS.parent / "kernels").rglob("*") if path.is_file()]
+    assert [path.name for path in files if f"| `{path.name}` |" not in made] == []
+
+
+def test_every_file_says_in_one_breath_what_it_is_for() -> None:
+    purpose = maker("make_modules").purpose
+    for path in PACKAGE.rglob("*.py"):
+        assert len(path.read_text("utf-8").partition("\n")[0]) <= 110, path
+        assert purpose(path).endswith("."), path
+    for path in (DOCS.parent / "kernels").rglob("*.[ch]*"):
+        assert purpose(path), path

@@ -68,7 +68,7 @@ PAGE = "# mypy: ignore-missing-imports\n"
 def pages() -> dict[str, list[str]]:
     """The lines of the examples of each page that has some."""
     lines = {}
-    for page in sorted(DOCS.glob("*.md")):
+    for page in sorted(DOCS.rglob("*.md")):
         if found := re.findall(r"```python\n(.*?)```", page.read_text("utf-8"), re.DOTALL):
             lines[page.stem.replace("-", "_")] = (PAGE + "\n".join(found)).splitlines()
     return lines

@@ -1,4 +1,4 @@
-"""Gives work to the cluster: a bounded number of bundles at a time, in order of need; what is lost is given out again.
+"""Gives work to the cluster, a bounded number of bundles at a time, and again what is lost.
 
 All of it runs in one event loop. Whoever waits for results is in another thread, and gets them through a queue.
 """

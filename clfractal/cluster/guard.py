@@ -1,4 +1,4 @@
-"""Whether a program may start processes: each of them runs the program's file again, up to `if __name__ == "__main__":`."""
+"""Whether a program may start processes, each of which runs the program's file again."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A connection to a scheduler, and the workers there that take part. Everything here runs in one event loop."""
+"""A connection to a scheduler, and the workers there that take part; it runs in one event loop."""
 
 from __future__ import annotations
 

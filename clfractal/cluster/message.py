@@ -1,4 +1,4 @@
-"""Scenes and jobs as bytes, with their large arrays apart: those are sent once to each worker, and known by digests."""
+"""Scenes and jobs as bytes, with their large arrays apart, which each worker gets once."""
 
 from __future__ import annotations
 

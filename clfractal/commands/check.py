@@ -1,4 +1,4 @@
-"""`clfractal check`: the scene with every default filled in, how it moves, and where the eyes of a stereo scene are."""
+"""`clfractal check`: the scene with every default filled in, how it moves, where a pair's eyes are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Completion of command lines, which Typer does: whose shells can have it, and what words stand for values."""
+"""Completion of command lines, done by Typer: which shells can have it, and words that stand for values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands that check and tell, and their options; see `options.py`."""
+"""The commands that check and tell, and their options."""
 
 from __future__ import annotations
 

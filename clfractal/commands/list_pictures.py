@@ -1,4 +1,4 @@
-"""The commands that make pictures, and their options; see `options.py`."""
+"""The commands that make pictures, and their options."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The commands about scene files, and their options; see `options.py`."""
+"""The commands about scene files, and their options."""
 
 from __future__ import annotations
 

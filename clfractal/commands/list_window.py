@@ -1,4 +1,4 @@
-"""The command that opens the window, and their options; see `options.py`."""
+"""The command that opens the window, and its options."""
 
 from __future__ import annotations
 

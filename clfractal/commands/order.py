@@ -1,4 +1,4 @@
-"""The options of a render on the command line."""
+"""The options of a render on the command line, together and checked."""
 
 from __future__ import annotations
 

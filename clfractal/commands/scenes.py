@@ -1,4 +1,4 @@
-"""`clfractal scenes`: the scenes that come with the program, as lines, as text, or as a sheet of small pictures."""
+"""`clfractal scenes`: the scenes that come with the program, as lines, as text, or as small pictures."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What this process is doing, for whoever waits: each part of the work that may last says so while it lasts."""
+"""What this process is doing, for whoever waits: work that may last says so while it lasts."""
 
 from __future__ import annotations
 

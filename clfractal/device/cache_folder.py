@@ -1,4 +1,4 @@
-"""Where the cache is.
+"""Where the cache is: the user's folder, or that of CLFRACTAL_CACHE.
 
 The usual place may be missing: a service user without a home, a read-only container. Then a temporary folder takes
 its place, with a remark.

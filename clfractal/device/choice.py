@@ -1,4 +1,4 @@
-"""Chooses several devices for one picture."""
+"""Chooses several devices for one picture, by their names or by their measured speed."""
 
 from __future__ import annotations
 

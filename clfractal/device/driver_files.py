@@ -1,4 +1,4 @@
-"""What PoCL keeps of a program, as bytes for the cache: its files, put together after compiling, laid out before loading.
+"""What PoCL keeps of a program, as bytes for the cache: packed after compiling, laid out before loading.
 
 PoCL has a folder for each program, with machine code for each kernel and size of work-group, in folders of two letters. It
 notes the last use of each, which tells the folders of one program from those of others.

@@ -1,4 +1,4 @@
-"""OpenCL does not live on in a forked process: its drivers' threads are not there, and who waits for them waits for ever.
+"""Refuses OpenCL in a forked process, which lacks the drivers' threads and would wait for ever.
 
 `multiprocessing` forks by default on Linux before Python 3.14. A child that was forked before OpenCL was used may use it.
 """

@@ -1,4 +1,4 @@
-"""The sizes of work-groups. OpenCL 1.2 guarantees none: some devices take less than others, and of some kernels less."""
+"""The sizes of work-groups, of which OpenCL 1.2 guarantees none."""
 
 from __future__ import annotations
 

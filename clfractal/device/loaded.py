@@ -1,4 +1,4 @@
-"""Programs that are loaded on a device, so that they are not read from the disk again, and kernels of theirs that rest."""
+"""Programs that are loaded on a device, and kernels of theirs that rest: none is read from the disk twice."""
 
 from __future__ import annotations
 

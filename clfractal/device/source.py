@@ -1,5 +1,4 @@
-"""One flat OpenCL C text out of an entry point, its headers and generated parts, with every line's origin
-kept.
+"""One flat OpenCL C text of an entry point, its headers and generated parts; each line's origin is kept.
 
 Drivers disagree about include paths and cache by file name, so they are given a single text; `#line`
 directives make their messages speak of the files that were written by hand.

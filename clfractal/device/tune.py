@@ -1,4 +1,4 @@
-"""Which lane counts work: tried once per device and driver, and remembered. (The fastest: `renderers/lanes.py`.)
+"""Which lane counts work: tried once per device and driver, and remembered.
 
 Each lane count is tried in a child process of its own. A driver may abort on one (PoCL's wheel on `sqrt` of a
 `float16`, where the processor has no AVX-512), hang on another, or compute nonsense: all three reject it.

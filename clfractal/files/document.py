@@ -1,4 +1,4 @@
-"""Reads untrusted YAML into plain data with line and column, and writes YAML; the only file that uses the yaml library.
+"""Reads untrusted YAML into plain data with line and column, and writes YAML.
 
 A document is built from the parser's events rather than by a loader: there is no recursion, only
 strings, numbers, booleans, lists and mappings are constructed, and an alias is counted as all the values that it expands

@@ -1,4 +1,4 @@
-"""The scenes in pictures: the text in the header of any format that may hold one. Each format has its own module."""
+"""The scenes in pictures: the text in the header of any format that may hold one."""
 
 from __future__ import annotations
 

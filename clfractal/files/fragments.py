@@ -1,4 +1,4 @@
-"""Plain data as pieces of YAML text, on one line or on several, that `read_document` reads back as equal data."""
+"""Plain data as pieces of YAML text, which `read_document` reads back as equal data."""
 
 from __future__ import annotations
 

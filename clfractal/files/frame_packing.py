@@ -1,4 +1,4 @@
-"""Tells players of H.264 and H.265 how two eyes' pictures lie in one: the message of frame packing (SEI, payload 45).
+"""Tells players of H.264 and H.265 how two eyes' pictures lie in one, by the message of frame packing.
 
 Encoders write none (x265), or none in which the right eye's picture comes first (x264). So the message is made here, by
 ITU-T H.264 (08/2021), D.1.26, and ITU-T H.265 (08/2021), D.2.16, and put before the slices of each key picture.

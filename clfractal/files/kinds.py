@@ -1,4 +1,4 @@
-"""What a file is, which decides who reads it: by how it begins, or, where that says nothing, by how its name ends."""
+"""What a file is, and so who reads it: by how it begins or, where that says nothing, how its name ends."""
 
 from __future__ import annotations
 

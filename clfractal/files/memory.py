@@ -1,4 +1,4 @@
-"""How much memory the machine has left, for saying beforehand that something does not fit; and how much was used."""
+"""How much memory the machine has left, to say beforehand that something does not fit."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Writes moving pictures by FFmpeg's libraries (package `av`): codecs, pixels, and the words that players need for colours.
+"""Writes moving pictures by FFmpeg's libraries: codecs, pixels, and what players must know of colours.
 
 Pictures come in as sRGB codes, and are stored as red, green and blue or, as most codecs want it, as Y'CbCr by the matrix of
 ITU-R BT.709, in its limited range. The file tells so, with the primaries of BT.709 and the transfer function of sRGB (IEC

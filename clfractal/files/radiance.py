@@ -1,5 +1,6 @@
-"""Reads Radiance's pictures (`.hdr`, RGBE and XYZE): Ward, Real Pixels, Graphics Gems II (1991), and the Radiance
-file formats reference (picture files).
+"""Reads Radiance's pictures (`.hdr`, RGBE and XYZE).
+
+Ward, Real Pixels, Graphics Gems II (1991), and the Radiance file formats reference (picture files).
 
 A file is a header of text lines, a line with its size, and rows of pixels of four bytes: three mantissas that share an
 exponent. Rows lie flat, in runs of whole pixels (before 1991), or with each byte of the pixels in runs of its own.

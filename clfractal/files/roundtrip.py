@@ -1,4 +1,4 @@
-"""Writes changed values into a YAML text and leaves everything else in it as it is: comments, order, style, spaces.
+"""Writes changed values into a YAML text and leaves comments, order, style and spaces as they are.
 
 A round-trip library that writes a whole document sets its own line breaks, indents and spaces. Here its parser tells
 where each value stands, and only those pieces of the text are replaced. The result is read back; if it does not hold

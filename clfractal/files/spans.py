@@ -1,4 +1,4 @@
-"""A YAML text as a tree of values that know which part of the text they are, for edits that leave the rest as it is."""
+"""A YAML text as a tree of values that know their part of the text, so that edits leave the rest alone."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What Linux, macOS and Windows do differently with files, in one place; the rest of the program asks for none of it.
+"""What Linux, macOS and Windows do differently with files, so that nothing else asks for the system.
 
 Windows translates line ends in descriptors that are not binary, hands descriptors to child processes unless told not to,
 and replaces or removes no file that is open.

@@ -1,4 +1,4 @@
-"""Looks now and then whether files have changed on the disk, such as a scene's own and the formula files that it names."""
+"""Looks now and then whether files have changed on the disk, such as a scene's and its formulas'."""
 
 from __future__ import annotations
 

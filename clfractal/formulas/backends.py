@@ -1,5 +1,4 @@
-"""Kinds of number that a tree can be evaluated with, besides Python's floats: NumPy arrays, mpmath, and duals
-of both.
+"""Kinds of number that a tree can be evaluated with: NumPy arrays, mpmath, and duals of both.
 
 All follow the conventions of `evaluate.py`. Duals carry partial derivatives forward (Griewank and Walther,
 Evaluating Derivatives, 2nd ed., SIAM 2008, ch. 3); at a kink or a pole of a derivative the partial is

@@ -1,4 +1,4 @@
-"""Formulas of one's own, found by name: files in the folder `formulas` beside a scene, and in those of CLFRACTAL_FORMULAS.
+"""Formulas of one's own, found by name: beside a scene, and in the folders of CLFRACTAL_FORMULAS.
 
 The library's names win, then the folder beside the scene, then the folders of the variable in their order.
 """

@@ -1,4 +1,4 @@
-"""Differentiates what an `Emitter` wrote over `real`: the partials of an expression by the components of the state.
+"""Differentiates what an `Emitter` wrote over `real`, by the components of the state.
 
 A formula's map depends on each component in few places, so its own 3 x 3 (or 4 x 4) Jacobian is sparse and shares much with
 the map; multiplying it by the J carried along often costs less than carrying three partials through every operation.

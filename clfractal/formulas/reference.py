@@ -1,5 +1,4 @@
-"""The oracle: escape counts and distances with NumPy in float64, and orbits and Jacobians with mpmath at any
-precision.
+"""The oracle of tests: counts, distances, orbits and Jacobians by NumPy, and by mpmath at any precision.
 
 Written for clarity, straight from the definitions in the design: what the kernels compute is compared with
 this.

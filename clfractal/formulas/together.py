@@ -1,4 +1,4 @@
-"""Several formulas in one text: the functions of each under names of its own, and those that choose between them.
+"""Several formulas in one text: each one's functions under names of its own, and those that choose.
 
 Before the constants of each stands the number of its leaf: whoever is given constants asks the formula whose they are.
 """

@@ -1,4 +1,4 @@
-"""Pictures as objects of other libraries."""
+"""Pictures as objects of other libraries: Pillow and xarray."""
 
 from __future__ import annotations
 

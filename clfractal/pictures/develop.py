@@ -1,4 +1,6 @@
-"""Developing: from a film's light to light that a screen shows, by exposure and a tone curve; both linear Rec. 709.
+"""Developing: from a film's light to light that a screen shows, by exposure and a tone curve.
+
+Both are linear Rec. 709.
 
 Each eye's picture is developed before two are mixed in one. Files of display light (PNG, JPEG, WebP) and notebooks show
 developed pictures, and by the same steps the window does (`kernels/show.h`); an EXR holds the film's own light.

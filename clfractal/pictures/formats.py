@@ -1,4 +1,4 @@
-"""What each format of picture files can hold, and the refusal of what it cannot, before anything is rendered."""
+"""What each format of picture files can hold; what it cannot is refused before anything is rendered."""
 
 from __future__ import annotations
 

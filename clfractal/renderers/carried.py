@@ -1,4 +1,4 @@
-"""What is carried from stage to stage, and summed over shots: structs of reals in C, each declared here once."""
+"""What is carried from stage to stage, and summed over shots: structs of reals, each declared here once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How finely a picture shows the set: what belongs to the scene, and what to the number of pixels that is rendered."""
+"""How finely a picture shows the set: what belongs to the scene, and what to the number of pixels."""
 
 from __future__ import annotations
 

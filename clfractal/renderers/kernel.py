@@ -1,4 +1,4 @@
-"""A renderer of tiles: turns a planned view into the texts of programs, their data, and the order of their kernels.
+"""A renderer of tiles: turns a planned view into texts of programs, their data, and the order of kernels.
 
 `kernels/passes.h` has what all their kernels have in common. A renderer does not decide
 how many pixels a launch has, or where the results go.

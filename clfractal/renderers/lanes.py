@@ -1,4 +1,4 @@
-"""Finds the fastest lane count of a device: measured once for each device and driver, with the march used for rendering.
+"""Finds the fastest lane count of a device, measured once with the march that renders.
 
 Small pictures are marched with each lane count that works (`device/tune.py`): the Mandelbulb by its scalar rule, and hast
 by its Jacobian, since what fits one into the processor's registers need not fit the other. Before that a first picture

@@ -1,4 +1,4 @@
-"""Which things pixels show: numbers and Cryptomatte layers, made of what the kernel notes (`mattes` in `kernels/pixel.h`).
+"""Which things pixels show: numbers and Cryptomatte layers, made of what the kernel notes.
 
 Cryptomatte (Friedman and Jones 2015; its specification 1.2.0, Psyop) names things by 32 bits of MurmurHash3 (Appleby),
 told as the bits of a float; each rank is a pair of this identifier and what the thing covers, the largest first.

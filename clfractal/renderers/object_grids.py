@@ -1,4 +1,4 @@
-"""The grids of objects that are volumes, in one buffer, as kernels read them (`kernels/object_grids.h`, `clouds.h`)."""
+"""The grids of objects that are volumes, in one buffer, as kernels read them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The common parts of all renderers' kernels (`kernels/passes.h`): sampling, data kept for pixels, statistics."""
+"""What all renderers' kernels have in common: sampling, data kept for pixels, statistics."""
 
 from __future__ import annotations
 

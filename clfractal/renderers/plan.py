@@ -1,4 +1,4 @@
-"""The plan: everything a renderer decides before it touches a device. Plain data, so that it can travel to a worker."""
+"""The plan: all that a renderer decides before it touches a device, as plain data that can travel."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Trial marches: two small pictures whose rays a device marches as it does those of scenes, with the time that takes.
+"""Trial marches: two small pictures whose rays a device marches as those of scenes, and the time of it.
 
 The rays are made here, since only their march is measured. They go through the queue of all renderers' rays
 (`kernels/queue.h`), in which lanes that are done take the next one: packets that wait for their last ray would tell

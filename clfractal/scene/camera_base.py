@@ -1,4 +1,4 @@
-"""Where a camera is: its position, target and up, and shorter ways to say them, which are resolved when a scene is read."""
+"""Where a camera is: position, target and up, and shorter ways to say them, resolved when a scene is read."""
 
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self

@@ -1,4 +1,4 @@
-"""Where the surface's colour comes from."""
+"""Where the surface's colour comes from: a quantity and a palette."""
 
 from collections.abc import Sequence
 from typing import Annotated, Any, Literal, Self

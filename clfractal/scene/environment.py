@@ -1,4 +1,4 @@
-"""Finds a scene's environment map, in the program or beside the scene, or makes a sky; its pixels stay with the scene."""
+"""Finds a scene's environment map, in the program or beside the scene, or makes a sky."""
 
 from __future__ import annotations
 

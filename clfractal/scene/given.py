@@ -1,4 +1,4 @@
-"""Grids from files that volume scenes and objects show: they are read, given a place, and kept with the scene."""
+"""Grids from files that volume scenes and objects show: read, given a place, and kept with the scene."""
 
 from __future__ import annotations
 

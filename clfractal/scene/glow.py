@@ -1,4 +1,4 @@
-"""Light around the set."""
+"""Light around the set, by how near rays pass it."""
 
 from typing import Literal
 

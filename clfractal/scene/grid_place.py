@@ -1,4 +1,4 @@
-"""Where a grid is in the scene: an affine map, so that turned, oblique and mirrored grids stand where they belong."""
+"""Where a grid is in the scene: an affine map, for turned, oblique and mirrored grids too."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values of a material that differ from place to place: a quantity through a curve or a palette, or a picture."""
+"""Values of a material that differ from place to place: a quantity through a curve, or a picture."""
 
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args

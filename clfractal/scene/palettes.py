@@ -1,4 +1,4 @@
-"""The project's own palettes: a few colours each, interpolated in Oklab so that no mixture looks grey or dull."""
+"""The project's own palettes: a few colours each, mixed in Oklab so that none looks grey or dull."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A physical sky as a latitude-longitude map: the light of the air, and the ground below; and the sun's disc before it.
+"""A physical sky as a latitude-longitude map, with the ground below and the sun's disc before it.
 
 `atmosphere.py` gives light by wavelength. It becomes CIE XYZ by the fits of Wyman, Sloan and Shirley (Simple
 Analytic Approximations to the CIE XYZ Color Matching Functions, JCGT 2 (2), 2013), the sun being a black body of

@@ -1,4 +1,4 @@
-"""Where a camera stands, by other words than its position: angles round its target, roll, moves, a ball that is to be seen.
+"""Where a camera stands by other words than its position: angles, roll, moves, a ball that is to be seen.
 
 Scene units and degrees. Plain arithmetic without NumPy, so that reading a scene is quick.
 """

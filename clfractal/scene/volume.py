@@ -1,4 +1,4 @@
-"""The volume renderer's settings: the box that is filled, the values of its voxels, and how rays sample them."""
+"""The volume renderer's settings: the box, the values of its voxels, and how rays sample them."""
 
 from math import prod
 from typing import Annotated, Literal, Self

@@ -1,4 +1,4 @@
-"""Cameras whose orbit, roll or shift a film moves: as plain data they are what the scene gave, words and all."""
+"""Cameras whose orbit, roll or shift a film moves: as plain data they are what the scene gave."""
 
 from collections.abc import Iterable, Mapping
 from typing import Any

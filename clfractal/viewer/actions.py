@@ -1,4 +1,4 @@
-"""Everything that a key can do in the window, in the order of the help overlay, with the keys that it comes with."""
+"""Everything that a key can do in the window, in the order of the help, with the keys it comes with."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Which part of the scene a place of the picture belongs to: each view of a layout may have its own camera or plane."""
+"""Which part of the scene a place of the picture belongs to, as views of a layout have their own cameras."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The window: its main loop, which only handles events and draws; everything that takes long happens in other threads."""
+"""The window's main loop, which only handles events and draws: what takes long happens in other threads."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Keeps unsaved changes on the disk, so that the next window can offer them if this one ends without saving them.
+"""Keeps unsaved changes on the disk, so that the next window can offer them after a crash.
 
 Every window has three files in one folder: the scene's text, a note about it, and a lock that the system gives back
 when the window's process ends, however it ends.

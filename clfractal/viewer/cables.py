@@ -1,4 +1,4 @@
-"""Monitors that windows fill, and that may be unplugged, switched off and come back, perhaps at another place."""
+"""Monitors that windows fill, and that may be unplugged and come back, perhaps at another place."""
 
 from __future__ import annotations
 

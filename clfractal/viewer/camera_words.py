@@ -1,4 +1,4 @@
-"""The words that a text has for the place of a camera, such as `orbit`, which a scene that was read no longer has."""
+"""A text's words for the place of a camera, such as `orbit`, which a scene that was read no longer has."""
 
 from __future__ import annotations
 

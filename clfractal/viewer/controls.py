@@ -1,4 +1,4 @@
-"""The pointer in the picture: drags, wheel and clicks become moves of cameras, planes, lights and zoom boxes."""
+"""The pointer in the picture: drags, wheel and clicks move cameras, planes, lights and zoom boxes."""
 
 from __future__ import annotations
 

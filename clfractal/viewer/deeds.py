@@ -1,4 +1,4 @@
-"""Does the actions of the table of keys, also for buttons of panels: those of the window here, those of the scene there."""
+"""Does the actions of the table of keys, also for buttons of panels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""How far a pair's parallax goes in the picture that is shown, and the line for the user where that is too far."""
+"""How far a pair's parallax goes in the picture that is shown, and a line for the user if too far."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Brings frames from canvases to where OpenGL shows them, beside the window's thread: it never waits for OpenCL."""
+"""Brings frames from canvases to where OpenGL shows them, in a thread, as the window never waits."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A scene that is edited at a frame of its film: what is shown there, what is saved, keys, and steps of undo."""
+"""A scene that is edited at a frame of its film: what is shown and saved, keys, steps of undo."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is measured before a picture, in a window: when it rests; until then what was measured last goes along."""
+"""What a window measures before a picture that rests; while it moves the last measures go along."""
 
 from __future__ import annotations
 

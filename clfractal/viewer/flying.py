@@ -1,4 +1,4 @@
-"""Flying with keys held: the speed follows the distance to the surface, so that every scale is explored alike."""
+"""Flying with keys held, at a speed that follows the distance to the surface."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The texts of formulas that were typed in the window, comments and all: saved scenes hold them, and show them again."""
+"""The texts of formulas that were typed in the window, so that they are saved and shown as typed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the renderer of a window gives to its display."""
+"""What the renderer of a window gives to its display: a canvas and what is known of it."""
 
 from __future__ import annotations
 

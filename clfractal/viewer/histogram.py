@@ -1,4 +1,4 @@
-"""How often values occur in the grid of a volume scene, found in the background from a small grid of the same box."""
+"""How often values occur in the grid of a volume scene, counted in a small grid of the same box."""
 
 from __future__ import annotations
 

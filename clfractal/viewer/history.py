@@ -1,4 +1,4 @@
-"""Undo and redo, with a stack for the camera and one for everything else: undoing a colour does not move the camera."""
+"""Undo and redo, with a stack for the camera and one for everything else."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cameras apart from the rest of a scene: where the window looks from is nobody's edit, and stays when a file is loaded."""
+"""Cameras apart from the rest of a scene, so that the window's view stays when a file is loaded."""
 
 from __future__ import annotations
 

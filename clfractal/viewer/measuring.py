@@ -1,4 +1,4 @@
-"""Measures the window's device while nobody wants anything else of it; its first pictures come before that."""
+"""Measures the window's device while nobody wants anything else of it."""
 
 from __future__ import annotations
 

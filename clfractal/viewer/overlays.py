@@ -1,4 +1,4 @@
-"""Wireframes over a picture: segments of space, cut to what the picture shows, and whether a surface hides them."""
+"""Wireframes over a picture: segments of space, cut to what the picture shows, perhaps hidden."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The real screen's width follows a window that the user resizes; full screens and projectors have the scene's."""
+"""The real screen's width: a window that the user resizes changes it, full screens never do."""
 
 from __future__ import annotations
 

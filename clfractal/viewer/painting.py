@@ -1,4 +1,4 @@
-"""A session's executors, and what renders a job's views onto a canvas, so that they can be shown while they grow."""
+"""A session's executors, and what renders a job's views onto a canvas while they grow."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What lies under the pointer: found in the depths that came with the shown picture, without asking the device."""
+"""What lies under the pointer, found in the depths that came with the shown picture."""
 
 from __future__ import annotations
 

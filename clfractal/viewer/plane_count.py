@@ -1,4 +1,4 @@
-"""What a cut plane's own picture shows under the pointer: the point of space, and how often the formula was applied."""
+"""What a cut plane's own picture shows under the pointer: the point of space, and its count."""
 
 from __future__ import annotations
 

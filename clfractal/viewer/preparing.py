@@ -1,4 +1,4 @@
-"""What a picture needs before its first ray: programs, grids, measures; made in a thread beside the old picture."""
+"""What a picture needs before its first ray, made in a thread: programs, grids, measures."""
 
 from __future__ import annotations
 

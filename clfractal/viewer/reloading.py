@@ -1,4 +1,4 @@
-"""The scene's file while its window is open: what another program changes in it is loaded, what becomes of it is told."""
+"""The scene's file while its window is open: what another program changes in it is loaded."""
 
 from __future__ import annotations
 

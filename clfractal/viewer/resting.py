@@ -1,4 +1,4 @@
-"""The window's picture without its noise: when all its samples are made, and the scene's output wants that."""
+"""The window's picture without its noise, once all samples are made, where the scene wants that."""
 
 from __future__ import annotations
 

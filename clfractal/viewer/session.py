@@ -1,4 +1,4 @@
-"""Renders what a window wants to see, beside the window's thread: coarse while it moves, gathering samples at rest."""
+"""Renders what a window wants to see, in a thread: coarse while it moves, in more samples at rest."""
 
 from __future__ import annotations
 

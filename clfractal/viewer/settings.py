@@ -1,4 +1,4 @@
-"""The user's settings of the window: a YAML file in the configuration folder, read with every mistake at its line."""
+"""The user's settings of the window: a YAML file, read with every mistake at its line."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Values that a scene's text has once and uses at several places, by a YAML anchor: edits leave them one thing."""
+"""Values that a scene's text has once and uses at several places (YAML anchors): edits leave them one."""
 
 from __future__ import annotations
 

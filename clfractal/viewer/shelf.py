@@ -1,4 +1,4 @@
-"""Scene files with small pictures, as a gallery shows them. A thread reads scenes, and pictures kept on the disk."""
+"""Scene files with small pictures, as a gallery shows them, read by a thread."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pictures of the window: what it shows as a PNG, alone or with its panels, beside the scene or where `--shot` says."""
+"""Pictures of the window as PNG files, alone or with its panels, for a key or `--shot`."""
 
 from __future__ import annotations
 

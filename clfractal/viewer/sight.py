@@ -1,4 +1,4 @@
-"""What a picture shows, as places in space: where things are put so that they are seen, and what orbits turn about.
+"""What a picture shows, as places in space: where to put things, and what orbits turn about.
 
 Places in the picture are pixels from its upper left corner, lengths scene units.
 """

@@ -1,4 +1,4 @@
-"""The timeline without its panel: what can be done to a scene's `animation`, as functions from one to the next.
+"""What can be done to a scene's `animation`, as functions from one to the next.
 
 Times are frames, counted from 0, which may lie between two. A key keeps the word that it was written with: one with `time`
 stays in seconds. No two keys of a track are at the same frame: a key that is put where another one is replaces it.

@@ -1,4 +1,4 @@
-"""What a window works with: its screens, the studio that renders for it, its panels, and what lies under the pointer."""
+"""What a window works with: screens, the studio, panels, and what lies under the pointer."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The cube that marks a volume's next zoom, moved and scaled in the picture, applied and stepped back (thesis, 3.1).
+"""The cube that marks a volume's next zoom, moved and scaled in the picture (thesis, 3.1).
 
 There are two spaces: the formula's, in which a scene's `renderer.zoom` is given, and the picture's, where the zoomed box is
 shown in the place of the first one. A box keeps its place in the formula's space, so that it is saved as it is.

@@ -1,4 +1,4 @@
-"""What stored bricks hold: the parts that may be visible, the octree's last levels; and the range of their values."""
+"""What stored bricks hold: the parts that may be visible, and the range of their values."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A grid of voxels on a device: a table of bricks, and pools of samples and normals for those that are stored."""
+"""A grid of voxels on a device: a table of bricks, and pools of samples and normals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The octree over a grid: finding the bricks that may hold something, and how far there is nothing around a brick."""
+"""The octree over a grid: which bricks may hold something, and how far around others is nothing."""
 
 from __future__ import annotations
 

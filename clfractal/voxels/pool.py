@@ -1,4 +1,4 @@
-"""Memory for bricks on a device: a pool is one buffer, or up to four where one would be too large for the device."""
+"""Memory for bricks on a device: one buffer, or up to four where one would be too large."""
 
 from __future__ import annotations
 

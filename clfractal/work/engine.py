@@ -1,4 +1,4 @@
-"""The engine: a device, or several, and an executor that keeps its programs and data from picture to picture."""
+"""The engine: a device, or several, with programs and data that stay from picture to picture."""
 
 from __future__ import annotations
 

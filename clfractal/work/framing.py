@@ -1,4 +1,4 @@
-"""A first scene of a formula: how far to iterate it, from where to see all of it, and colours, all found by small looks."""
+"""A first scene of a formula: iterations, a camera that sees all of it, and colours, by small looks."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Grids of voxels made of scenes, as plain data: what `clfractal voxelize` writes and `clfractal.voxelize` gives."""
+"""Grids of voxels made of scenes, as plain data, for `clfractal voxelize` and Python."""
 
 from __future__ import annotations
 

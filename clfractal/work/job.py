@@ -1,4 +1,4 @@
-"""A job: all decisions about a picture, made before a device is used, as plain data that can be sent to another process.
+"""A job: all decisions about a picture, made before a device is used, as plain data that can be sent.
 
 A job is a list of views and one composition that makes one picture of them. Its scene contains everything that determines
 the pixels (including the number types and samples in use), so that rendering the scene in a picture's header gives the same

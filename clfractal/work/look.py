@@ -1,4 +1,4 @@
-"""Quick looks at a scene before it is rendered: small pictures with depth, and single pixels, through a closed lens."""
+"""Quick looks at a scene before it is rendered: small pictures with depth, and single pixels."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compiles programs before a picture waits for them: those of scenes, or of all formulas and scenes of the library."""
+"""Compiles programs before a picture waits for them: those of scenes, or of the whole library."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Makes all decisions about a picture, in one place for the shell, for Python, and for every kind of picture."""
+"""Makes all decisions about a picture, in one place for the shell, Python and every kind of picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a scene leaves to be measured before it is rendered: `stereo.fit`, `camera.focus` and `output.exposure: auto`.
+"""Measures what a scene leaves open before it is rendered: a pair's fit, focus and exposure.
 
 Each is measured by a quick look at the whole picture and replaced by what was found. So a region, either eye, a resumed
 picture, and the scene in a picture's header all have the same numbers.

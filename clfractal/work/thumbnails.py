@@ -1,4 +1,4 @@
-"""Small pictures of scene files, kept on the disk: the window's gallery and the sheets of the shell show the same ones.
+"""Small pictures of scene files, kept on the disk for the window's gallery and the shell's sheets.
 
 Kept pictures are optional, as all of the cache is: without them they are rendered again.
 """

@@ -1,4 +1,4 @@
-"""Steps of a scene's point of view: round the target, nearer or farther, wider or narrower; of a cut plane, its place."""
+"""Steps of a scene's point of view: round the target, nearer, wider; of a cut plane, its place."""
 
 from __future__ import annotations
 

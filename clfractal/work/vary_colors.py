@@ -1,4 +1,4 @@
-"""Steps of a look: colours by hue, strength and lightness as the eye sees them, palettes, and the lights' places."""
+"""Steps of a look: colours by hue, strength and lightness, palettes, and the lights' places."""
 
 from __future__ import annotations
 

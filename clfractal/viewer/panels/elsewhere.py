@@ -1,4 +1,4 @@
-"""What a search finds that no panel shows at the moment: of other renderers and ways of lighting, of what is off."""
+"""What a search finds that no panel shows at the moment: of other renderers, of what is off."""
 
 from __future__ import annotations
 

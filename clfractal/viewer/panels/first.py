@@ -1,4 +1,4 @@
-"""What objects and lights begin with that are added in the window: they are seen where they are put, and lights light."""
+"""What objects and lights that are added in the window begin with, so that they are seen and give light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The formula: which one, its parameters, its iterations, a Julia set's constant, and the members of a chain."""
+"""The formula: which one, its parameters, iterations, a Julia set's constant, members of a chain."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The formula as text: checked while it is typed, an error shown at its place, and taken over when it is right.
+"""The formula as text: checked while it is typed, and taken over when it is right.
 
 The check reads and binds the formula as a scene's is, but compiles nothing. What is wrong never reaches the scene, which
 keeps its last good formula and picture.

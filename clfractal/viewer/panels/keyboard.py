@@ -1,4 +1,4 @@
-"""Panels by the keyboard: Tab goes into them and on, Enter opens and switches, Escape leads back to the picture.
+"""Panels by the keyboard: Tab goes on, Enter opens and switches, Escape leads back to the picture.
 
 Otherwise Dear ImGui's keys for this are off: arrows, the space bar and Enter are the picture's, also while the pointer is
 over a panel.

@@ -1,4 +1,4 @@
-"""What panels are laid out with: rows with labels, collapsible headings, explanations, and the search for settings."""
+"""What panels are laid out with: rows with labels, headings, explanations, the search for settings."""
 
 from __future__ import annotations
 

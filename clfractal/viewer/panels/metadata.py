@@ -1,4 +1,4 @@
-"""What the schema says of a scene's values: kind, bounds, default and description; the source of all widgets."""
+"""What the schema says of a scene's values, from which all widgets follow: kind, bounds, default."""
 
 from __future__ import annotations
 

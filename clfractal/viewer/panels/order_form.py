@@ -1,4 +1,4 @@
-"""What the panels that order pictures and films are made of: labels, sizes, whole numbers and bars of what is done."""
+"""What panels that order pictures and films are made of: labels, sizes, whole numbers, bars."""
 
 from __future__ import annotations
 

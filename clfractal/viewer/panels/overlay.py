@@ -1,4 +1,4 @@
-"""The figures over the picture's lower rim, as the thesis's programs have them: time, depth, method, zoom, stereo."""
+"""The figures over the picture's lower rim: time, depth, method, zoom, stereo."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The column at the window's right: variations, stills, films and history, those that are open below each other."""
+"""The column at the window's right: variations, stills, films and history."""
 
 from __future__ import annotations
 

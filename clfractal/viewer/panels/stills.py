@@ -1,4 +1,4 @@
-"""Stills: the present scene as picture files of any size, rendered in the background; and how far they are."""
+"""Stills: the present scene as picture files of any size, rendered in the background."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The timeline below the picture: the film's buttons, a ruler to scrub on, tracks with keys or as curves, an inspector."""
+"""The timeline below the picture: the film's buttons, a ruler to scrub on, tracks, an inspector."""
 
 from __future__ import annotations
 

@@ -1,6 +1,4 @@
-"""The transfer function of a volume or an object: opacity and colour of values, edited by dragging points over their
-histogram.
-"""
+"""The transfer function of a volume or an object, edited by dragging points over the histogram."""
 
 from __future__ import annotations
 
