@@ -10,15 +10,17 @@ import numpy as np
 
 from clfractal.device.orbit import JOINS, SOLID_KINDS, Record, orbit_record
 from clfractal.device.structs import Precision
+from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.formulas.together import write_together
-from clfractal.scene.base import frame_of, length
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import Ball, FormulaObject, Joined, PlaneObject, Solid, ball_of_both, turned_axes
+from clfractal.scene.objects import FormulaObject, ball_of_both
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.base import frame_of, length
+from clfractal.schema.shape import Ball, Joined, Solid, turned_axes
 
 # Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
 _BESIDE = 0.5

@@ -29,7 +29,7 @@ from clfractal.files.png import read_texts
 from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, own, parser, turns
 from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
-from clfractal.scene.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
+from clfractal.schema.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.viewer import settings
 from clfractal.work import frames
 from tests.document import DOCS, PAGES, code, section, table, text

@@ -102,7 +102,7 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
     own = {
         *("clfractal.device.buildlog", "clfractal.pictures.anaglyph", "clfractal.pictures.probe"),
         *("clfractal.renderers.volume", "clfractal.renderers.cut_plane", "clfractal.voxels"),
-        *("clfractal.scene.messages", "clfractal.scene.palette", "clfractal.optics.stereo"),
+        *("clfractal.schema.messages", "clfractal.scene.palette", "clfractal.optics.stereo"),
         *(
             "clfractal.work.comfort",
             "clfractal.work.films",

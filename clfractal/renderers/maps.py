@@ -12,13 +12,13 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
-from clfractal.scene.base import unit
 from clfractal.scene.blends import Blends, blends_of, has_skin, is_cloudy, is_glass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
+from clfractal.schema.base import unit
 
 MAP = Struct(
     "Map",

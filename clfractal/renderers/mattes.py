@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.channels import MATERIAL_MATTES, MATTE_RANKS, MATTES, OBJECT_MATTES
-from clfractal.scene.objects import AnyObject
+from clfractal.schema.shape import ObjectBase
 
 if TYPE_CHECKING:
     from clfractal.scene.model import Scene
@@ -55,7 +55,7 @@ def materials_of(scene: Scene) -> Things:
     def number(name: str | None) -> int:
         return len(names) if name is None else 1 + names.index(name)
 
-    bodies: tuple[AnyObject, ...] = tuple(scene.objects.values())
+    bodies: tuple[ObjectBase, ...] = tuple(scene.objects.values())
     return Things(names, (number(own), *(number(each.material or own) for each in bodies)))
 
 

@@ -14,13 +14,14 @@ from clfractal.renderers.maps import MappedMaterials, glass_bodies
 from clfractal.renderers.materials import used_materials
 from clfractal.renderers.object_grids import NO_GRID, ObjectGrids, grid_defines
 from clfractal.renderers.water import WAVES, wave_set
-from clfractal.scene.base import Vector, frame_of, length
 from clfractal.scene.blends import is_glass
 from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
-from clfractal.scene.objects import AXES, AnyObject, FormulaObject, Solid, VolumeObject, WaterObject
+from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
+from clfractal.schema.base import Vector, frame_of, length
+from clfractal.schema.shape import AXES, Level, ObjectBase, Solid
 
 _OTHER_KINDS = {"water": 0, "joined": 5, "volume": 6, "cloud": 7}
 OBJECT_KINDS = SHAPE_KINDS | _OTHER_KINDS
@@ -134,14 +135,14 @@ def mirrors(scene: Scene) -> bool:
     return any(np.any(look["mirror"]) or np.any(look["mirror_edge"]) for look in looks)
 
 
-def _kind(each: AnyObject) -> str:
+def _kind(each: ObjectBase) -> str:
     """The kind of an object, among OBJECT_KINDS."""
     if isinstance(each, FormulaObject):
         return "joined"
-    return "cloud" if isinstance(each, VolumeObject) and each.is_cloud else each.type
+    return "cloud" if isinstance(each, VolumeObject) and each.is_cloud else each.tag
 
 
-def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
+def _place(scene: Scene, each: ObjectBase) -> dict[str, object]:
     """Where it is, and its waves."""
     nothing = (0.0,) * WAVES
     row: dict[str, object] = {
@@ -166,6 +167,7 @@ def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
     elif isinstance(each, FormulaObject):
         axes = [np.array(axis) for axis in AXES]
     else:
+        assert isinstance(each, Level)
         axes = [np.array(axis) for axis in frame_of(each.normal)]
     row.update(zip(("own_x", "own_y", "own_z"), axes, strict=True))
     if isinstance(each, WaterObject):
@@ -184,14 +186,14 @@ def _place(scene: Scene, each: AnyObject) -> dict[str, object]:
     return row
 
 
-def _has_color(scene: Scene, each: AnyObject) -> bool:
+def _has_color(scene: Scene, each: ObjectBase) -> bool:
     """Whether it has a colour of its own; formulas have the set's colouring where their material has none."""
     if not isinstance(each, FormulaObject):
         return True
     return each.material is not None and scene.materials[each.material].base.color is not None
 
 
-def own_color(scene: Scene, each: AnyObject) -> Vector | None:
+def own_color(scene: Scene, each: ObjectBase) -> Vector | None:
     """The colour of an object's body, linear Rec. 709; None: it has the set's colouring."""
     if not _has_color(scene, each):
         return None
@@ -199,7 +201,7 @@ def own_color(scene: Scene, each: AnyObject) -> Vector | None:
     return (float(x), float(y), float(z))
 
 
-def _look(scene: Scene, each: AnyObject) -> dict[str, Any]:
+def _look(scene: Scene, each: ObjectBase) -> dict[str, Any]:
     """How it looks in Phong's light."""
     phong = scene.material
     if each.material is None:

@@ -18,7 +18,6 @@ from clfractal.renderers.maps import asked_maps
 from clfractal.renderers.objects import mirrors
 from clfractal.renderers.plan import Plan
 from clfractal.renderers.set_lights import SingleLight, single_lights
-from clfractal.scene.base import unit
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
@@ -34,6 +33,7 @@ from clfractal.scene.lighting import (
 from clfractal.scene.maps import QUANTITIES, Map
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient, Image
+from clfractal.schema.base import unit
 
 VIEW = Struct(
     "View",

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.scene.base import Vector
 from clfractal.scene.volume import Transfer
+from clfractal.schema.base import Vector
 
 TRANSFER_SIZE = 1024
 # What is opaque still has a depth, of which its own light comes and into which paths go.

@@ -9,8 +9,8 @@ from random import Random
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.scene.base import dot, frame_of
 from clfractal.scene.objects import WaterObject, Waves
+from clfractal.schema.base import dot, frame_of
 
 WAVES = 16
 """Waves of water."""

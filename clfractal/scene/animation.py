@@ -6,8 +6,8 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import Number, Section, chosen_by_list, problem
-from clfractal.scene.hex_color import AlsoAs
+from clfractal.schema.base import Number, Section, chosen_by_list, problem
+from clfractal.schema.hex_color import AlsoAs
 
 MAX_FRAMES = 1_000_000
 MAX_KEYS = 10_000

@@ -4,8 +4,8 @@ from typing import Annotated
 
 from pydantic import AfterValidator, Field
 
-from clfractal.scene.base import problem
 from clfractal.scene.parts import Camera
+from clfractal.schema.base import problem
 
 MAX_BOOKMARKS = 100
 MAX_NAME = 100

@@ -5,7 +5,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import (
+from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
+from clfractal.schema.base import (
     Angle,
     Coordinate,
     Length,
@@ -17,7 +18,6 @@ from clfractal.scene.base import (
     minus,
     problem,
 )
-from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
 
 WORDS = ("orbit", "roll", "shift")
 """Keys of a camera that are other words for its position, target and up, and that films can move."""

@@ -13,17 +13,18 @@ from clfractal.files.channels import (
     OBJECT_MATTES,
     SURFACE_LAYERS,
 )
-from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
-from clfractal.scene.objects import FormulaObject, Simple
+from clfractal.scene.objects import FormulaObject
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
+from clfractal.schema.base import Vector
+from clfractal.schema.shape import Simple
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain

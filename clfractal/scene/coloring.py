@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import (
+from clfractal.schema.base import (
     Color,
     Coordinate,
     Fraction,
@@ -16,7 +16,7 @@ from clfractal.scene.base import (
     length,
     problem,
 )
-from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
+from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
 
 
 class Stop(Section):

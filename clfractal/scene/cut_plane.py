@@ -4,11 +4,12 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.scene.coloring import Palette, check_order
-from clfractal.scene.objects import MAX_OBJECTS, ObjectName
+from clfractal.scene.objects import MAX_OBJECTS
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
+from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
+from clfractal.schema.names import ObjectName
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 

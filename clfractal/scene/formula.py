@@ -4,7 +4,7 @@ from typing import Annotated, Any, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Coordinate, Number, Section, problem
+from clfractal.schema.base import Coordinate, Number, Section, problem
 
 MAX_LINKS = 64
 MAX_LIVE = 32

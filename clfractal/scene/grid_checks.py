@@ -1,11 +1,11 @@
 """Checks of volumes among a scene's objects that need their grids."""
 
 from clfractal.errors import SceneError, Where
-from clfractal.scene.base import Vector
 from clfractal.scene.grid_values import is_finite_somewhere, lacking
 from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import PlacedGrid, placed, used_level, volumes_of
+from clfractal.schema.base import Vector
 
 
 def check_grids(scene: Scene) -> None:

@@ -8,8 +8,8 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.scene.base import Vector, length
 from clfractal.scene.stance import Extent
+from clfractal.schema.base import Vector, length
 
 Doubles: TypeAlias = npt.NDArray[np.float64]
 Steps: TypeAlias = tuple[Vector, Vector, Vector]

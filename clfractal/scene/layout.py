@@ -5,13 +5,13 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Color, Fraction, Section, problem
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.glow import Glow
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Material
 from clfractal.scene.renderer import Renderer
+from clfractal.schema.base import Color, Fraction, Section, problem
 
 MAX_VIEWS = 16
 

@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag
 
-from clfractal.scene.base import Section, chosen_by
+from clfractal.schema.base import Section, chosen_by
 
 MAX_BOUNCES = 256
 

@@ -4,7 +4,10 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import (
+from clfractal.scene.coloring import Palette, Trap, check_order
+from clfractal.scene.surface import Ball
+from clfractal.scene.temperature import black_body
+from clfractal.schema.base import (
     Amount,
     Color,
     Coordinate,
@@ -20,9 +23,6 @@ from clfractal.scene.base import (
     problem,
     unit,
 )
-from clfractal.scene.coloring import Palette, Trap, check_order
-from clfractal.scene.surface import Ball
-from clfractal.scene.temperature import black_body
 
 MAX_LIGHTS = 64
 MAX_PLACES = 20_000

@@ -185,7 +185,7 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
     try:
         return document, Scene.model_validate(plain, context={"folder": folder})
     except ValidationError as error:
-        from clfractal.scene.messages import first_error
+        from clfractal.schema.messages import first_error
 
         raise first_error(error, document, Scene) from error
 

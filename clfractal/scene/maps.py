@@ -6,7 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.fields import FieldInfo
 
-from clfractal.scene.base import (
+from clfractal.scene.coloring import Palette, Trap, check_order
+from clfractal.schema.base import (
     Amount,
     Coordinate,
     Fraction,
@@ -18,7 +19,6 @@ from clfractal.scene.base import (
     length,
     problem,
 )
-from clfractal.scene.coloring import Palette, Trap, check_order
 
 QUANTITIES = (
     "iterations",

@@ -2,10 +2,11 @@
 
 from typing import Annotated, Self
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.base import Color, Coordinate, Length, problem
 from clfractal.scene.maps import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
+from clfractal.schema.base import Color, Coordinate, Length, problem
+from clfractal.schema.names import MaterialName
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
 IorMap = Annotated[Annotated[Ior, Tag("given")] | Annotated[NumberMap, Tag("map")], FORM]
@@ -131,16 +132,7 @@ class Bump(Mapped):
     )
 
 
-MAX_MATERIALS, MAX_NAME = 64, 100
-
-
-def _fitting(name: str) -> str:
-    if not name.isprintable() or name.isspace() or "." in name:
-        raise problem("a material's name must be printable text on one line, without a dot")
-    return name
-
-
-MaterialName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
+MAX_MATERIALS = 64
 
 
 class PbrMaterial(Mapped):

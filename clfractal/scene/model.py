@@ -13,7 +13,6 @@ from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
 from clfractal.errors import ClfractalError
 from clfractal.files.inputs import noting
 from clfractal.scene.animation import Animation
-from clfractal.scene.base import Section, Vector
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
@@ -23,7 +22,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting, PathLighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
-from clfractal.scene.objects import FormulaObject, Joined, Objects, Solid, ball_of_both
+from clfractal.scene.objects import FormulaObject, Objects, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
@@ -31,6 +30,8 @@ from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.scene.words import with_words
+from clfractal.schema.base import Section, Vector
+from clfractal.schema.shape import Joined, Solid
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain

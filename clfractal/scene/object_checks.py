@@ -1,5 +1,6 @@
 """Checks of a scene's objects: their materials, lights in them, and what cannot show them."""
 
+from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.blends import has_skin, is_glass
 from clfractal.scene.cut_plane import CutPlaneRenderer
@@ -7,18 +8,10 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
 from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import (
-    MAX_FORMULAS,
-    MAX_VOLUMES,
-    FormulaObject,
-    Level,
-    PlaneObject,
-    Solid,
-    VolumeObject,
-    WaterObject,
-)
+from clfractal.scene.objects import MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.shape import Level, Solid
 
 
 def check_objects(scene: Scene) -> None:
@@ -58,7 +51,7 @@ def _check_named(scene: Scene) -> None:
             each = scene.objects[name]
             if isinstance(each, Level):
                 raise SceneError(
-                    f"{name!r} cannot be cut: a {each.type} surface has no end; a flat box can", where
+                    f"{name!r} cannot be cut: a {each.tag} surface has no end; a flat box can", where
                 )
             if isinstance(each, VolumeObject):
                 raise SceneError(f"{name!r} cannot be cut: it is a volume, which no plane opens", where)

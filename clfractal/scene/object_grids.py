@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 
 from clfractal.errors import SceneError, Where
-from clfractal.scene.base import Vector
 from clfractal.scene.given import GivenGrid, read_grid
 from clfractal.scene.grid_place import GridPlace, vector_of
-from clfractal.scene.objects import MAX_VALUES, AnyObject, VolumeObject, turned_axes
+from clfractal.scene.objects import MAX_VALUES, VolumeObject
+from clfractal.schema.base import Vector
+from clfractal.schema.shape import ObjectBase, turned_axes
 
 
-def volumes_of(objects: Mapping[str, AnyObject]) -> dict[str, VolumeObject]:
+def volumes_of(objects: Mapping[str, ObjectBase]) -> dict[str, VolumeObject]:
     """Those that are volumes, by name."""
     return {name: each for name, each in objects.items() if isinstance(each, VolumeObject)}
 
 
-def grid_files(objects: Mapping[str, AnyObject]) -> dict[str, str]:
+def grid_files(objects: Mapping[str, ObjectBase]) -> dict[str, str]:
     """The files that volumes name, and of each the path of the key that names it first."""
     found: dict[str, str] = {}
     for name, each in volumes_of(objects).items():
@@ -28,7 +29,7 @@ def grid_files(objects: Mapping[str, AnyObject]) -> dict[str, str]:
     return found
 
 
-def with_grids(objects: Mapping[str, AnyObject], names: Mapping[str, str]) -> dict[str, AnyObject]:
+def with_grids(objects: Mapping[str, ObjectBase], names: Mapping[str, str]) -> dict[str, ObjectBase]:
     """The objects with other names of their files; those without any are the same."""
     result = dict(objects)
     for name, each in volumes_of(objects).items():
@@ -37,7 +38,7 @@ def with_grids(objects: Mapping[str, AnyObject], names: Mapping[str, str]) -> di
     return result
 
 
-def read_grids(objects: Mapping[str, AnyObject], folder: Path) -> dict[str, GivenGrid]:
+def read_grids(objects: Mapping[str, ObjectBase], folder: Path) -> dict[str, GivenGrid]:
     """The grids of a scene that was loaded from `folder`, by their files, each in the place that the file says.
 
     Raises:

@@ -1,14 +1,14 @@
-"""Objects beside the set: planes, water, spheres, boxes, cylinders, formulas and volumes, by name."""
+"""Objects beside the set, by name: shapes, water, formulas and volumes."""
 
 import math
-from abc import abstractmethod
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from clfractal.scene.base import (
+from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.volume import Transfer
+from clfractal.schema.base import (
     Amount,
-    Angle,
     Coordinate,
     Fraction,
     Length,
@@ -16,16 +16,14 @@ from clfractal.scene.base import (
     Position,
     Section,
     Vector,
-    chosen_by,
     cross,
     length,
     problem,
     unit,
 )
-from clfractal.scene.formula import FormulaSpec
-from clfractal.scene.materials import MAX_NAME, MaterialName
-from clfractal.scene.plane import turn
-from clfractal.scene.volume import Transfer
+from clfractal.schema.kinds import in_order, members, one_of
+from clfractal.schema.names import ObjectName
+from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, turned_axes
 
 MAX_OBJECTS = 64
 MAX_FORMULAS = 8
@@ -34,65 +32,6 @@ MAX_VOLUMES = 8
 """Most objects that are volumes: a ray looks for each one's surface, or goes through each one's cloud."""
 MAX_VALUES = 1 << 28
 """Most values of all volumes' grids together: what their places are counted in, and a gigabyte of memory."""
-Ball: TypeAlias = tuple[Vector, float]
-"""A centre and a radius, scene units."""
-AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-
-Angles = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
-Sides = Annotated[tuple[Length, Length, Length], Field(strict=False)]
-
-
-class ObjectBase(Section):
-    """Keys that every object has."""
-
-    material: MaterialName | None = Field(
-        None, description="one of `materials`; null: as `material`, in its colour"
-    )
-    position: Position = Field((0.0, 0.0, 0.0), description="its middle, or a point of a plane; scene units")
-
-
-class Joined(ObjectBase):
-    """An object that may be a part of the set: joined to it, or cut out of it."""
-
-    join: Literal["union", "smooth_union", "cut", "intersection"] = Field(
-        "union",
-        description="with the set and the formulas above it in the file: beside them; flowing together; taken out of"
-        " them; or only what both have in common is left",
-    )
-    smoothness: Length = Field(
-        0.2, description="of a smooth union: how far apart surfaces begin to flow together, scene units"
-    )
-
-
-class Simple(Joined):
-    """A body that an equation tells; of a formula only its chain knows what is inside."""
-
-    @abstractmethod
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is inside."""
-
-
-class Level(ObjectBase):
-    """A surface without an end, seen from both sides."""
-
-    normal: Position = Field((0.0, 0.0, 1.0), description="direction that it faces")
-
-    @model_validator(mode="after")
-    def _faces_somewhere(self) -> Self:
-        if length(self.normal) < 1e-12:
-            raise problem("must not be zero", "normal")
-        return self
-
-
-class PlaneObject(Simple, Level):
-    """A plane without an end; as a part of the set, all below it."""
-
-    tag = "plane"
-    type: Literal["plane"] = "plane"
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is below it."""
-        return sum((p - q) * n for p, q, n in zip(point, self.position, self.normal, strict=True)) < 0
 
 
 class Waves(Section):
@@ -113,6 +52,8 @@ class WaterObject(Level):
     """A plane without an end, on which waves travel."""
 
     tag = "water"
+    title = "Water"
+    place = 20
     type: Literal["water"] = "water"
     waves: Waves = Field(default_factory=dict, validate_default=True, description="its waves")
 
@@ -139,20 +80,12 @@ def ball_of_both(a: Ball, b: Ball) -> Ball:
     return (x, y, z), radius
 
 
-def turned_axes(rotation: Vector) -> tuple[Vector, Vector, Vector]:
-    """The three axes after turns about those of space, in degrees; each has length 1."""
-    found = []
-    for axis in AXES:
-        for about, degrees in zip(AXES, rotation, strict=True):
-            axis = turn(axis, about, degrees)
-        found.append(axis)
-    return found[0], found[1], found[2]
-
-
 class FormulaObject(Joined):
     """The set of another formula, or of the same one at another place."""
 
     tag = "formula"
+    title = "Formula"
+    place = 80
     type: Literal["formula"] = "formula"
     formula: FormulaSpec = Field(description="as the scene's own")
     rotation: Angles = Field(
@@ -179,101 +112,12 @@ class FormulaObject(Joined):
         return (x, y, z), self.scale * radius
 
 
-class Solid(Simple):
-    """A body with an inside."""
-
-    rotation: Angles = Field(
-        (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
-    )
-    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
-
-    @property
-    @abstractmethod
-    def half_sides(self) -> Vector:
-        """Of the box around it, along its own axes, before `scale`."""
-
-    @property
-    def axes(self) -> tuple[Vector, Vector, Vector]:
-        """From its middle to the ends of its own three axes, scene units."""
-        found = []
-        for axis, half, factor in zip(turned_axes(self.rotation), self.half_sides, self.scale, strict=True):
-            x, y, z = axis
-            found.append((x * half * factor, y * half * factor, z * half * factor))
-        return found[0], found[1], found[2]
-
-    @property
-    def ball(self) -> Ball:
-        """Around it."""
-        return self.position, math.hypot(*(length(axis) for axis in self.axes))
-
-    def own_place(self, point: Vector) -> Vector:
-        """A point in units of `axes` from its middle."""
-        offset = [p - q for p, q in zip(point, self.position, strict=True)]
-        x, y, z = (
-            sum(o * a for o, a in zip(offset, axis, strict=True)) / sum(a * a for a in axis)
-            for axis in self.axes
-        )
-        return (x, y, z)
-
-
-class SphereObject(Solid):
-    """A ball, or with `scale` an ellipsoid."""
-
-    tag = "sphere"
-    type: Literal["sphere"] = "sphere"
-    radius: Length = Field(0.5, description="scene units")
-
-    @property
-    def half_sides(self) -> Vector:
-        """As of every solid."""
-        return (self.radius, self.radius, self.radius)
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is inside."""
-        return length(self.own_place(point)) < 1
-
-
-class BoxObject(Solid):
-    """A box."""
-
-    tag = "box"
-    type: Literal["box"] = "box"
-    size: Sides = Field((1.0, 1.0, 1.0), description="its sides, scene units")
-
-    @property
-    def half_sides(self) -> Vector:
-        """As of every solid."""
-        x, y, z = self.size
-        return (x / 2, y / 2, z / 2)
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is inside."""
-        return max(abs(x) for x in self.own_place(point)) < 1
-
-
-class CylinderObject(Solid):
-    """A cylinder with lids; its axis is z before it is rotated."""
-
-    tag = "cylinder"
-    type: Literal["cylinder"] = "cylinder"
-    radius: Length = Field(0.25, description="scene units")
-    height: Length = Field(1.0, description="from lid to lid, scene units")
-
-    @property
-    def half_sides(self) -> Vector:
-        """As of every solid."""
-        return (self.radius, self.radius, self.height / 2)
-
-    def holds(self, point: Vector) -> bool:
-        """Whether a point is inside."""
-        x, y, z = self.own_place(point)
-        return x * x + y * y < 1 and abs(z) < 1
-
-
 class VolumeObject(ObjectBase):
     """A grid of values from a file: a surface where they pass a level, or along paths a cloud."""
 
     tag = "volume"
+    title = "Volume"
+    place = 90
     type: Literal["volume"] = "volume"
     file: str = Field(min_length=1, description="its values: a NRRD or NPY file beside the scene")
     size: Length | None = Field(
@@ -316,26 +160,9 @@ class VolumeObject(ObjectBase):
         return self
 
 
-AnyObject: TypeAlias = (
-    PlaneObject | WaterObject | SphereObject | BoxObject | CylinderObject | FormulaObject | VolumeObject
-)
-SceneObject = Annotated[
-    Annotated[PlaneObject, Tag("plane")]
-    | Annotated[WaterObject, Tag("water")]
-    | Annotated[SphereObject, Tag("sphere")]
-    | Annotated[BoxObject, Tag("box")]
-    | Annotated[CylinderObject, Tag("cylinder")]
-    | Annotated[FormulaObject, Tag("formula")]
-    | Annotated[VolumeObject, Tag("volume")],
-    chosen_by("type", "sphere"),
-]
-
-
-def _fitting(name: str) -> str:
-    if not name.isprintable() or name.isspace() or "." in name:
-        raise problem("an object's name must be printable text on one line, without a dot")
-    return name
-
-
-ObjectName = Annotated[str, Field(strict=True, min_length=1, max_length=MAX_NAME), AfterValidator(_fitting)]
+KINDS = in_order((*members("shapes"), WaterObject, FormulaObject, VolumeObject))
+if TYPE_CHECKING:
+    SceneObject: TypeAlias = ObjectBase
+else:
+    SceneObject = one_of(KINDS, "type", "sphere")
 Objects = Annotated[dict[ObjectName, SceneObject], Field(max_length=MAX_OBJECTS)]

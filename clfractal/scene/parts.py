@@ -11,7 +11,8 @@ from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validato
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES, unknown_channel
 from clfractal.files.curves import Tone
-from clfractal.scene.base import (
+from clfractal.scene.camera_base import CameraBase
+from clfractal.schema.base import (
     Amount,
     Color,
     Fraction,
@@ -23,9 +24,8 @@ from clfractal.scene.base import (
     minus,
     problem,
 )
-from clfractal.scene.camera_base import CameraBase
-from clfractal.scene.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
-from clfractal.scene.materials import MaterialName
+from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
+from clfractal.schema.names import MaterialName
 
 MAX_SIDE = 65_536
 MAX_PIXELS = 2**30

@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from math import cos, fmod, radians, sin
 from typing import Annotated, Literal, Self, TypeVar
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import (
+from clfractal.schema.base import (
     Angle,
     Coordinate,
     Length,
@@ -19,6 +18,7 @@ from clfractal.scene.base import (
     length,
     minus,
     problem,
+    turn,
     unit,
 )
 
@@ -189,23 +189,6 @@ def _like(plane: SomePlane, placed: Placed) -> SomePlane:
         return placed
     names = ("center", "normal", "up", "width", "height")
     return Plane.checked({name: getattr(placed, name) for name in names})
-
-
-def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
-    """A vector, turned about an axis of length 1 (Rodrigues' formula)."""
-    c, s = cos_sin(degrees)
-    across, along = cross(axis, vector), dot(axis, vector) * (1 - c)
-    x, y, z = (v * c + a * s + k * along for v, a, k in zip(vector, across, axis, strict=True))
-    return (x, y, z)
-
-
-def cos_sin(degrees: float) -> tuple[float, float]:
-    """Cosine and sine; exact at quarter turns, so that they cause no rounding."""
-    reduced = fmod(degrees, 360.0)
-    quarters = round(reduced / 90.0)
-    rest = radians(reduced - 90.0 * quarters)
-    c, s = cos(rest), sin(rest)
-    return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
 
 def _by_corners(low: Vector, right: Vector, high: Vector) -> Placed:

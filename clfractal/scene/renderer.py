@@ -4,10 +4,10 @@ from typing import Annotated
 
 from pydantic import Tag
 
-from clfractal.scene.base import chosen_by
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.base import chosen_by
 
 Renderer = Annotated[
     Annotated[SurfaceRenderer, Tag("surface")]

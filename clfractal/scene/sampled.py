@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Section, problem
+from clfractal.schema.base import Section, problem
 
 # The default of `min_samples`: fewer samples do not show how much a pixel's samples scatter.
 USUAL_MIN_SAMPLES = 16

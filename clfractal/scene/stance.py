@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from itertools import product
 from math import atan2, degrees, hypot, inf, radians, tan
 
-from clfractal.scene.base import Vector, cross, dot, length, minus, unit
-from clfractal.scene.plane import cos_sin, turn
+from clfractal.schema.base import Vector, cos_sin, cross, dot, length, minus, turn, unit
 
 LARGEST = 1e6
 """Largest coordinate of a camera, scene units."""

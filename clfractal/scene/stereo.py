@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.errors import SceneError, Where
-from clfractal.scene.base import Position, Reflectance, Section, cross, length, problem
+from clfractal.schema.base import Position, Reflectance, Section, cross, length, problem
 
 # Screen, distance and eyes are measured in one unit, so their ratios cannot be larger than this.
 MAX_RATIO = 10_000

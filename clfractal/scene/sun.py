@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clfractal.scene.atmosphere import EARTH, SUN_RADIUS, Atmosphere, Doubles
-from clfractal.scene.base import Vector
 from clfractal.scene.sky import EYE, to_rgb
+from clfractal.schema.base import Vector
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Sky

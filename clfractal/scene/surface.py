@@ -5,8 +5,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.base import Length, Position, Section, problem
 from clfractal.scene.sampled import Sampled
+from clfractal.schema.base import Length, Position, Section, problem
 
 # Normals that need a middle point and its eight neighbours, so a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")

@@ -3,7 +3,7 @@
 from functools import lru_cache
 from math import exp, expm1
 
-from clfractal.scene.base import Vector
+from clfractal.schema.base import Vector
 
 # h c / k, nanometres times kelvin.
 _SECOND_RADIATION = 1.438776877e7

@@ -4,29 +4,24 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
+from clfractal.elements.shapes.box import BoxObject
+from clfractal.elements.shapes.cylinder import CylinderObject
+from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.errors import SceneError, unknown_name
 from clfractal.files.marks import split_path
-from clfractal.scene.base import Section
 from clfractal.scene.camera_base import WORDS, CameraBase, Orbit
 from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import (
-    BoxObject,
-    CylinderObject,
-    FormulaObject,
-    Joined,
-    Solid,
-    SphereObject,
-    VolumeObject,
-    Waves,
-)
+from clfractal.scene.objects import FormulaObject, VolumeObject, Waves
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane, Transform
 from clfractal.scene.stereo import StereoPlane
 from clfractal.scene.surface import Ball
 from clfractal.scene.volume import Box, Zoom
+from clfractal.schema.base import Section
+from clfractal.schema.shape import Joined, Solid
 
 Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color"]
 """How a value goes from key to key.

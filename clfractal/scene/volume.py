@@ -6,8 +6,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, Tag, model_validator
 
 from clfractal.errors import SceneError, Where
-from clfractal.scene.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 from clfractal.scene.sampled import Sampled
+from clfractal.schema.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 
 MAX_RESOLUTION = 16_384
 Side = Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION)]

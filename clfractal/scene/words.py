@@ -4,8 +4,8 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from clfractal.files.marks import split_path
-from clfractal.scene.base import Section
 from clfractal.scene.camera_base import WORDS, CameraBase
+from clfractal.schema.base import Section
 
 
 def with_words(plain: dict[str, Any], sections: Section, tracks: Iterable[str]) -> None:

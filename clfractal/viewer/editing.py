@@ -13,8 +13,8 @@ from clfractal.errors import SceneError, Where
 from clfractal.files.marks import Document, node_from_plain
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.load import check_scene
-from clfractal.scene.messages import first_error
 from clfractal.scene.model import Scene
+from clfractal.schema.messages import first_error
 from clfractal.viewer.tracked import check_tracked
 
 

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from typing import Any
 
 from clfractal.errors import ClfractalError
-from clfractal.scene.base import Vector
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.plane import Plane
 from clfractal.scene.stereo import Mode
+from clfractal.schema.base import Vector
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.controls import Controls
@@ -314,7 +314,7 @@ class SceneDeeds:
                 changes["coloring.by"] = "solid"
         if kind == "cut_plane":
             changes["cut_planes"] = []
-        shown = {name: each for name, each in scene.objects.items() if can_show(kind, each.type)}
+        shown = {name: each for name, each in scene.objects.items() if can_show(kind, each.tag)}
         if len(shown) < len(scene.objects):
             changes["objects"] = {name: each.model_dump(mode="json") for name, each in shown.items()}
         if not self._edit(changes):

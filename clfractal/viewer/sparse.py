@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.files.fragments import same
-from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
+from clfractal.schema.base import Section
 
 # The kinds of camera, renderer, light and lighting that a section without its word for them has.
 USUAL_KINDS = frozenset(("perspective", "surface", "directional", "direct"))

@@ -9,10 +9,10 @@ from math import dist
 from typing import TypeAlias
 
 from clfractal.scene.animation import Animation, Key, Track
-from clfractal.scene.base import Vector
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import Movement
 from clfractal.scene.parts import AnyCamera
+from clfractal.schema.base import Vector
 from clfractal.viewer.timeline import NEAR
 
 TOLERANCE = 0.01

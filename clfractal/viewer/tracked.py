@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.errors import SceneError, Where
-from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 from clfractal.scene.tracks import target_of
+from clfractal.schema.base import Section
 
 
 class TrackedError(SceneError):

@@ -14,10 +14,10 @@ import numpy.typing as npt
 
 from clfractal.errors import SceneError, Where
 from clfractal.optics.view import View
-from clfractal.scene.base import Vector
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import Box, VolumeRenderer, Zoom
+from clfractal.schema.base import Vector
 from clfractal.viewer.pointer import Floats, Size, point_at, project
 
 MOST_ZOOMS = 64

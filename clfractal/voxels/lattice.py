@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.scene.base import Vector
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.volume import MAX_RESOLUTION, Box
+from clfractal.schema.base import Vector
 
 # Cells along the side of a brick, samples along it, and the room that a brick's samples take.
 BRICK = 8

@@ -7,12 +7,12 @@ from collections.abc import Collection
 from random import Random
 from typing import Any
 
-from clfractal.scene.base import Vector, cross, dot, length, minus, unit
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Camera, OrthographicCamera, PerspectiveCamera
-from clfractal.scene.plane import moved, rotated, scaled, turn
+from clfractal.scene.plane import moved, rotated, scaled
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.base import Vector, cross, dot, length, minus, turn, unit
 from clfractal.work.varied import Step, is_locked, rounded, signed
 
 # The boldest steps: degrees round the target and up or down, logarithms of distance and of the angle of view; of a plane:

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.scene.base import Vector, cross, length, unit
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, EscapeColors
 from clfractal.scene.layout import LayoutView
@@ -18,8 +17,8 @@ from clfractal.scene.lighting import DirectionalLight
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES, from_oklab, to_oklab
 from clfractal.scene.parts import Gradient
-from clfractal.scene.plane import turn
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.base import Vector, cross, length, turn, unit
 from clfractal.work.varied import Step, is_locked, rounded, signed
 
 # The boldest steps: degrees of hue, logarithm of the colourfulness, lightness (1 is from black to white), degrees of lights

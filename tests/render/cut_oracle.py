@@ -8,10 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.elements.shapes.box import BoxObject
+from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.formulas import reference
 from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import BoxObject, SphereObject
 from clfractal.scene.palette import named_table
 from tests import scenes
 from tests.render.objects_oracle import rotation_of

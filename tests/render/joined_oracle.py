@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.scene.objects import turned_axes
+from clfractal.schema.shape import turned_axes
 from tests.render.shots import (
     BALL_RADIUS,
     SPHERE_CENTER,

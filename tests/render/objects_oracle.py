@@ -6,10 +6,14 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.elements.shapes.box import BoxObject
+from clfractal.elements.shapes.cylinder import CylinderObject
+from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.renderers.water import wave_set
-from clfractal.scene.base import frame_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import BoxObject, CylinderObject, Solid, SphereObject, WaterObject
+from clfractal.scene.objects import WaterObject
+from clfractal.schema.base import frame_of
+from clfractal.schema.shape import Solid
 from tests.render.shots import Floats
 
 # A set that no camera of these tests sees, nor any ray.

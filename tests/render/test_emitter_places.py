@@ -87,7 +87,7 @@ def scene(shape: str) -> Scene:
 def axes(shape: str) -> Floats:
     """The object's own half axes, as rows."""
     (it,) = scene(shape).objects.values()
-    found: Floats = np.array(it.axes)  # type: ignore[union-attr]
+    found: Floats = np.array(it.axes)  # type: ignore[attr-defined]
     return found
 
 

@@ -12,7 +12,8 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.pictures.film import Film
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject, turned_axes
+from clfractal.scene.objects import FormulaObject
+from clfractal.schema.shape import turned_axes
 from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, degrees, sizes, slopes
 from tests.render.shots import normals_of, points_of, shoot
 from tests.scenes import scene_of

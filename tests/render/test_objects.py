@@ -259,5 +259,5 @@ def test_a_moving_object_keeps_its_program(device: Device) -> None:
     assert texts[0] == texts[1]
     ball, sea = frames[1].objects.values()
     assert ball.position == (1, 0, 1)
-    assert ball.radius == pytest.approx(0.4)  # type: ignore[union-attr]
-    assert sea.waves.time == pytest.approx(0.9)  # type: ignore[union-attr]
+    assert ball.radius == pytest.approx(0.4)  # type: ignore[attr-defined]
+    assert sea.waves.time == pytest.approx(0.9)  # type: ignore[attr-defined]

@@ -10,8 +10,8 @@ import pytest
 
 import clfractal
 from clfractal.files.srgb import encode8, encode16
-from clfractal.scene.hex_color import linear_color
 from clfractal.scene.load import dump_scene, load_scene
+from clfractal.schema.hex_color import linear_color
 from clfractal.viewer.saving import open_source, scene_text
 
 HEAD = "version: 1\nformula: {name: mandelbulb, iterations: 8}\ncamera: {position: [0, -3, 0]}\n"

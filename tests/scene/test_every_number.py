@@ -12,10 +12,10 @@ import pytest
 import clfractal
 from clfractal.errors import ClfractalError
 from clfractal.scene.animation import Animation, Key, Track
-from clfractal.scene.base import Section
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.tracks import target_of, value_under
+from clfractal.schema.base import Section
 
 # What no scene of the library has.
 MORE = """\

@@ -7,18 +7,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from clfractal.elements.shapes.box import BoxObject
+from clfractal.elements.shapes.cylinder import CylinderObject
+from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.errors import ClfractalError
 from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.movement import movement_of
-from clfractal.scene.objects import (
-    MAX_FORMULAS,
-    MAX_OBJECTS,
-    BoxObject,
-    CylinderObject,
-    FormulaObject,
-    SphereObject,
-)
+from clfractal.scene.objects import MAX_FORMULAS, MAX_OBJECTS, FormulaObject
 from tests.render.objects_oracle import rotation_of
 from tests.scenes import HEAD
 

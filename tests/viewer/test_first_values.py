@@ -117,7 +117,7 @@ def test_water_and_planes_are_level_as_the_camera_is(engine: Engine, monkeypatch
         assert ui.studio.edit({f"objects.{kind}": {"type": kind, **first.objects(ui)[kind]}}), (
             ui.studio.problems
         )
-        normal = np.array(ui.studio.scene.objects[kind].normal)  # type: ignore[union-attr]
+        normal = np.array(ui.studio.scene.objects[kind].normal)  # type: ignore[attr-defined]
         assert normal @ [1, 0.01, 0] == pytest.approx(np.linalg.norm(normal), rel=1e-3)
 
 

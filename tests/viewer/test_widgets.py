@@ -13,8 +13,8 @@ pytest.importorskip("imgui_bundle")
 from imgui_bundle import imgui
 
 from clfractal.scene.animation import Animation, Track
-from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
+from clfractal.schema.base import Section
 from clfractal.viewer.panels import material, metadata, timeline_inspector
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Scale, bar_part, moved_by, text_of, typed_number

@@ -10,7 +10,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.renderers.planes import zoom_of
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject, turned_axes
+from clfractal.scene.objects import FormulaObject
+from clfractal.schema.shape import turned_axes
 from tests.render.levels import BESIDE, CAMERA, UNEVEN, Floats, along, degrees, onto_level, sizes, slopes
 from tests.render.shots import normals_of, points_of, shoot
 from tests.scenes import scene_of

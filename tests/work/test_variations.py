@@ -19,11 +19,11 @@ from clfractal.formulas import catalog
 from clfractal.formulas.model import Parameter
 from clfractal.formulas.opencl import write_formula
 from clfractal.pictures.film import Film
-from clfractal.scene.base import cross, length, minus
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import from_oklab, to_oklab
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.schema.base import cross, length, minus
 from clfractal.work.engine import Engine
 from clfractal.work.variations import (
     KINDS,

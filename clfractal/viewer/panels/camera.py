@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from imgui_bundle import imgui
 
-from clfractal.scene.base import length, minus
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.schema.base import length, minus
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui

@@ -9,9 +9,9 @@ from imgui_bundle import imgui
 
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.objects import Solid
 from clfractal.scene.plane import Plane, scaled
 from clfractal.scene.surface import SurfaceRenderer
+from clfractal.schema.shape import Solid
 from clfractal.viewer import plane_moves
 from clfractal.viewer.panels import palette_editor, renderer, theme
 from clfractal.viewer.panels import widgets as w

@@ -8,8 +8,8 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
+from clfractal.schema.base import Section
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas, plain

@@ -10,8 +10,8 @@ from typing import Literal, get_args, get_origin
 
 from imgui_bundle import imgui
 
-from clfractal.scene.base import Section
 from clfractal.scene.model import Scene
+from clfractal.schema.base import Section
 from clfractal.viewer.panels import layout, theme
 from clfractal.viewer.panels.metadata import metas, sections_of
 from clfractal.viewer.panels.ui import Ui

@@ -16,6 +16,7 @@ from clfractal.scene.lighting import (
     SphereLight,
 )
 from clfractal.scene.places import usual_threshold
+from clfractal.schema.shape import solids
 from clfractal.viewer.panels import menu, right_dock, theme
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.timeline_area import left_of, room_of
@@ -72,16 +73,21 @@ def objects(ui: Ui) -> dict[str, dict[str, Any]]:
     return {
         "plane": level,
         "water": {**level, "waves": waves},
-        "sphere": {"position": place, "radius": short(radius)},
-        # Within the ball, as far as their corners reach.
-        "box": {"position": place, "size": [short(2 * radius / math.sqrt(3))] * 3},
-        "cylinder": {"position": place, "radius": short(0.45 * radius), "height": short(1.78 * radius)},
+        **{kind.tag: {"position": place, **_short(kind.first(radius))} for kind in solids()},
         "formula": {
             "position": vector(wide - scale * np.array(added.center), wide_radius),
             "formula": dict(_FORMULA_ADDED),
             "scale": scale,
         },
         "volume": {"position": vector(wide, wide_radius), "size": short(2 * wide_radius / math.sqrt(3))},
+    }
+
+
+def _short(values: dict[str, Any]) -> dict[str, Any]:
+    """Lengths, each as `short`."""
+    return {
+        name: [short(each) for each in value] if isinstance(value, list) else short(value)
+        for name, value in values.items()
     }
 
 

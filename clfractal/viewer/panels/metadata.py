@@ -11,9 +11,9 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from clfractal.scene.base import Section
 from clfractal.scene.maps import Map
 from clfractal.scene.model import Scene
+from clfractal.schema.base import Section
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
 

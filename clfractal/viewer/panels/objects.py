@@ -8,7 +8,8 @@ from typing import Any
 from imgui_bundle import imgui
 
 from clfractal.scene.object_checks import can_show
-from clfractal.scene.objects import MAX_OBJECTS, AnyObject, FormulaObject, Joined, VolumeObject
+from clfractal.scene.objects import KINDS, MAX_OBJECTS, FormulaObject, VolumeObject, WaterObject
+from clfractal.schema.shape import Joined, ObjectBase
 from clfractal.viewer.panels import first, formula, formula_library, maps, theme, transfer
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import area
@@ -19,16 +20,7 @@ from clfractal.viewer.panels.ui import Ui
 PHONG, NEW = "", " "
 _IN_A_ROW = 4
 _GRIDS, _MOST_FILES = (".nrrd", ".nhdr", ".npy"), 50
-_KINDS = {
-    "plane": "Plane",
-    "water": "Water",
-    "sphere": "Sphere",
-    "box": "Box",
-    "cylinder": "Cylinder",
-    "formula": "Formula",
-    "volume": "Volume",
-}
-
+_KINDS: dict[str, str] = {kind.tag: kind.title for kind in KINDS}
 _ABOUT = {
     "water": "Add water with waves",
     "formula": "Add the set of another formula",
@@ -63,7 +55,7 @@ def draw(ui: Ui) -> None:
         _object(ui, chosen)
 
 
-def _line(name: str, each: AnyObject, chosen: bool) -> bool:
+def _line(name: str, each: ObjectBase, chosen: bool) -> bool:
     """One object of the list; whether it was clicked."""
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide = imgui.get_content_region_avail().x
@@ -74,7 +66,7 @@ def _line(name: str, each: AnyObject, chosen: bool) -> bool:
         far = imgui.ImVec2(corner.x + wide, corner.y + height)
         draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
     y = corner.y + (height - imgui.get_font_size()) / 2
-    text = _KINDS[each.type]
+    text = each.title
     right = corner.x + wide - imgui.calc_text_size(text).x - 8
     draw.push_clip_rect(corner, imgui.ImVec2(right - 6, corner.y + height), True)
     draw.add_text(imgui.ImVec2(corner.x + 11, y), theme.packed(theme.TEXT), name)
@@ -154,7 +146,7 @@ def _object(ui: Ui, name: str) -> None:
     keys = [key for key in type(each).model_fields if key not in left]
     step = 0.01 * ui.studio.scene.bounds[1]
     w.fields(ui, path, keys, position={"step": step}, rotation={"unit": "°"})
-    if each.type == "water":
+    if isinstance(each, WaterObject):
         w.fields(ui, f"{path}.waves", tuple(type(each.waves).model_fields), spread={"unit": "°"})
     if each.material in ui.studio.scene.materials:
         w.group(ui, f"Material {each.material}")
@@ -198,7 +190,7 @@ def _volume(ui: Ui, path: str, each: VolumeObject) -> None:
     )
 
 
-def _material(ui: Ui, path: str, each: AnyObject) -> None:
+def _material(ui: Ui, path: str, each: ObjectBase) -> None:
     scene = ui.studio.scene
     width = w.row(ui, "Material", path=f"{path}.material", tip=w.value_tip(ui, f"{path}.material"))
     if width is None:

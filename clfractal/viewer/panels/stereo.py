@@ -9,10 +9,10 @@ import numpy as np
 from clfractal.errors import ClfractalError
 from clfractal.optics import stereo as geometry
 from clfractal.optics.view import View
-from clfractal.scene.base import length, minus
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import EyeName, Stereo
+from clfractal.schema.base import length, minus
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui

@@ -6,6 +6,7 @@ keep the import of the schema short.
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from math import cos, fmod, radians, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import (
@@ -21,7 +22,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from clfractal.arguments import plain
 from clfractal.errors import SceneError, Where
-from clfractal.scene.hex_color import AS_TEXT
+from clfractal.schema.hex_color import AS_TEXT
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -65,7 +66,7 @@ def _own_errors(cls: Any) -> Iterator[None]:
     except ValidationError as error:
         # Loaded for mistakes only.
         from clfractal.files.marks import Document, node_from_plain
-        from clfractal.scene.messages import first_error
+        from clfractal.schema.messages import first_error
 
         raise first_error(error, Document(node_from_plain({}, None)), cls) from None
 
@@ -223,6 +224,23 @@ def unit(a: Vector) -> Vector:
     a = (a[0] / largest, a[1] / largest, a[2] / largest)
     size = length(a)
     return (a[0] / size, a[1] / size, a[2] / size)
+
+
+def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
+    """A vector, turned about an axis of length 1 (Rodrigues' formula)."""
+    c, s = cos_sin(degrees)
+    across, along = cross(axis, vector), dot(axis, vector) * (1 - c)
+    x, y, z = (v * c + a * s + k * along for v, a, k in zip(vector, across, axis, strict=True))
+    return (x, y, z)
+
+
+def cos_sin(degrees: float) -> tuple[float, float]:
+    """Cosine and sine; exact at quarter turns, so that they cause no rounding."""
+    reduced = fmod(degrees, 360.0)
+    quarters = round(reduced / 90.0)
+    rest = radians(reduced - 90.0 * quarters)
+    c, s = cos(rest), sin(rest)
+    return ((c, s), (-s, c), (-c, -s), (s, -c))[quarters % 4]
 
 
 def frame_of(normal: Vector) -> tuple[Vector, Vector, Vector]:

@@ -1,0 +1,1 @@
+"""Shapes of objects, which `kernels/elements/shapes` knows by the same names."""

@@ -1,0 +1,34 @@
+"""A cylinder as an object."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from clfractal.schema.base import Length, Vector
+from clfractal.schema.shape import Solid
+
+
+class CylinderObject(Solid):
+    """A cylinder with lids; its axis is z before it is rotated."""
+
+    tag = "cylinder"
+    title = "Cylinder"
+    place = 50
+    type: Literal["cylinder"] = "cylinder"
+    radius: Length = Field(0.25, description="scene units")
+    height: Length = Field(1.0, description="from lid to lid, scene units")
+
+    @classmethod
+    def first(cls, radius: float) -> dict[str, Any]:
+        """As of every solid."""
+        return {"radius": 0.45 * radius, "height": 1.78 * radius}
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        return (self.radius, self.radius, self.height / 2)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        x, y, z = self.own_place(point)
+        return x * x + y * y < 1 and abs(z) < 1

@@ -1,0 +1,19 @@
+"""A plane, an object without an end."""
+
+from typing import Literal
+
+from clfractal.schema.base import Vector
+from clfractal.schema.shape import Level, Simple
+
+
+class PlaneObject(Simple, Level):
+    """A plane without an end; as a part of the set, all below it."""
+
+    tag = "plane"
+    title = "Plane"
+    place = 10
+    type: Literal["plane"] = "plane"
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is below it."""
+        return sum((p - q) * n for p, q, n in zip(point, self.position, self.normal, strict=True)) < 0

@@ -1,0 +1,32 @@
+"""A ball as an object."""
+
+from typing import Any, Literal
+
+from pydantic import Field
+
+from clfractal.schema.base import Length, Vector, length
+from clfractal.schema.shape import Solid
+
+
+class SphereObject(Solid):
+    """A ball, or with `scale` an ellipsoid."""
+
+    tag = "sphere"
+    title = "Sphere"
+    place = 30
+    type: Literal["sphere"] = "sphere"
+    radius: Length = Field(0.5, description="scene units")
+
+    @classmethod
+    def first(cls, radius: float) -> dict[str, Any]:
+        """As of every solid."""
+        return {"radius": radius}
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        return (self.radius, self.radius, self.radius)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        return length(self.own_place(point)) < 1

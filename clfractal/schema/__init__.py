@@ -1,0 +1,1 @@
+"""How the parts of a scene are declared: sections, fields with what is known of them, kinds, errors."""

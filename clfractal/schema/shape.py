@@ -1,0 +1,129 @@
+"""What objects have in common, and shapes above all: where they stand, how they are joined, what is inside."""
+
+import math
+from abc import abstractmethod
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+
+from pydantic import Field, model_validator
+
+from clfractal.schema.base import Angle, Length, Position, Vector, length, problem, turn
+from clfractal.schema.kinds import Element, members
+from clfractal.schema.names import MaterialName
+
+Ball: TypeAlias = tuple[Vector, float]
+"""A centre and a radius, scene units."""
+AXES: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+Angles = Annotated[tuple[Angle, Angle, Angle], Field(strict=False)]
+Sides = Annotated[tuple[Length, Length, Length], Field(strict=False)]
+
+
+def turned_axes(rotation: Vector) -> tuple[Vector, Vector, Vector]:
+    """The three axes after turns about those of space, in degrees; each has length 1."""
+    found = []
+    for axis in AXES:
+        for about, degrees in zip(AXES, rotation, strict=True):
+            axis = turn(axis, about, degrees)
+        found.append(axis)
+    return found[0], found[1], found[2]
+
+
+class ObjectBase(Element):
+    """Keys that every object has."""
+
+    material: MaterialName | None = Field(
+        None, description="one of `materials`; null: as `material`, in its colour"
+    )
+    position: Position = Field((0.0, 0.0, 0.0), description="its middle, or a point of a plane; scene units")
+
+
+class Joined(ObjectBase):
+    """An object that may be a part of the set: joined to it, or cut out of it."""
+
+    join: Literal["union", "smooth_union", "cut", "intersection"] = Field(
+        "union",
+        description="with the set and the formulas above it in the file: beside them; flowing together; taken out of"
+        " them; or only what both have in common is left",
+    )
+    smoothness: Length = Field(
+        0.2, description="of a smooth union: how far apart surfaces begin to flow together, scene units"
+    )
+
+
+class Simple(Joined):
+    """A body that an equation tells, a shape; of a formula only its chain knows what is inside.
+
+    A shape is a class in a file of `clfractal/elements/shapes`, and the file of the same name in
+    `kernels/elements/shapes`, which says what functions it has.
+    """
+
+    spans: ClassVar[int] = 1
+    """In how many parts a line can be inside of it."""
+
+    @property
+    def form(self) -> Vector:
+        """Numbers of its own that its kernel functions are given, beside where its sides are."""
+        return (0.0, 0.0, 0.0)
+
+    @abstractmethod
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+
+
+class Level(ObjectBase):
+    """A surface without an end, seen from both sides."""
+
+    normal: Position = Field((0.0, 0.0, 1.0), description="direction that it faces")
+
+    @model_validator(mode="after")
+    def _faces_somewhere(self) -> Self:
+        if length(self.normal) < 1e-12:
+            raise problem("must not be zero", "normal")
+        return self
+
+
+class Solid(Simple):
+    """A shape with an inside, around its middle; as a light it is asked for (`kernels/elements/emitters`)."""
+
+    rotation: Angles = Field(
+        (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
+    )
+    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
+
+    @classmethod
+    @abstractmethod
+    def first(cls, radius: float) -> dict[str, Any]:
+        """Values of one that is added in the window: it fills a ball of this radius."""
+
+    @property
+    @abstractmethod
+    def half_sides(self) -> Vector:
+        """Of the box around it, along its own axes, before `scale`."""
+
+    @property
+    def axes(self) -> tuple[Vector, Vector, Vector]:
+        """From its middle to the ends of its own three axes, scene units."""
+        found = []
+        for axis, half, factor in zip(turned_axes(self.rotation), self.half_sides, self.scale, strict=True):
+            x, y, z = axis
+            found.append((x * half * factor, y * half * factor, z * half * factor))
+        return found[0], found[1], found[2]
+
+    @property
+    def ball(self) -> Ball:
+        """Around it."""
+        return self.position, math.hypot(*(length(axis) for axis in self.axes))
+
+    def own_place(self, point: Vector) -> Vector:
+        """A point in units of `axes` from its middle."""
+        offset = [p - q for p, q in zip(point, self.position, strict=True)]
+        x, y, z = (
+            sum(o * a for o, a in zip(offset, axis, strict=True)) / sum(a * a for a in axis)
+            for axis in self.axes
+        )
+        return (x, y, z)
+
+
+def solids() -> tuple[type[Solid], ...]:
+    """All kinds of solids."""
+    return tuple(kind for kind in members("shapes") if issubclass(kind, Solid))
