@@ -468,6 +468,15 @@ def test_links_to_pages_and_headings(page: str) -> None:
 # --- what files say of themselves ---
 
 
+def test_the_map_stays_a_map() -> None:
+    assert len(text("architecture.md").splitlines()) <= 250
+    assert len(text("glossary.md").splitlines()) <= 40
+    missing = [
+        page for page in PAGES if page.startswith("engineering/") and page not in text("architecture.md")
+    ]
+    assert missing == []
+
+
 def test_the_list_of_modules_is_what_the_files_say() -> None:
     made = maker("make_modules").page()
     assert (DOCS / "engineering" / "modules.md").read_text("utf-8") == made, "run docs/make_modules.py"

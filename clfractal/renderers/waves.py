@@ -17,7 +17,7 @@ With `lighting.mode: path` in the place of the last two
 ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
 those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
 With media that scatter light `cross_media` stands before `scatter_paths` and `end_paths`, and with clouds `pass_clouds`
-after the former. See "A shot" in docs/architecture.md.
+after the former. See docs/engineering/shots.md.
 """
 
 from __future__ import annotations
