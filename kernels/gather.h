@@ -8,11 +8,18 @@ typedef mask ints;
 #define floats_load(array) ((array)[0])
 #define pick_ints(m, yes, no) ((m) ? (yes) : (no))
 #else
-// With numbers of 64 bits as wide as masks; in memory these are ints and floats.
 #define to_ints(a) CONVERT(OF_LANES(INTEGER), a)
+#if REAL_IS_DOUBLE
+// As wide as masks; in memory these are ints and floats.
 #define ints_load(array) to_ints(JOIN(vload, LANES)(0, array))
 #define ints_store(value, array) JOIN(vstore, LANES)(CONVERT(OF_LANES(int), value), 0, array)
 #define floats_load(array) to_reals(JOIN(vload, LANES)(0, array))
+#else
+// Without a conversion to the type that they have: Intel's compiler takes minutes for many of these.
+#define ints_load(array) JOIN(vload, LANES)(0, array)
+#define ints_store(value, array) JOIN(vstore, LANES)(value, 0, array)
+#define floats_load(array) JOIN(vload, LANES)(0, array)
+#endif
 #define pick_ints(m, yes, no) ((m) ? (ints)(yes) : (ints)(no))
 #endif
 
