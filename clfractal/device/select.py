@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -79,6 +80,7 @@ class DeviceInfo:
 class Device:
     """An OpenCL device with a context of its own, made when it is first needed, as its two queues are.
 
+    Threads that need them first at the same time get the same ones: what is made in one context is of no use in another.
     `loaded` keeps programs of this context, and goes with it.
 
     Args:
@@ -102,12 +104,31 @@ class Device:
         self._make_context = make_context
         self._parts: dict[tuple[int, ...], tuple[Device, ...]] = {}
         self.loaded = LoadedPrograms()
+        # From Python 3.12 on threads may compute a cached property at the same time, each its own.
+        self._opening = threading.RLock()
 
     def __repr__(self) -> str:
         return f"Device({self.info.index} {self.info.name!r})"
 
-    @cached_property
+    @property
     def context(self) -> cl.Context:
+        with self._opening:
+            return self._context
+
+    @property
+    def queue(self) -> cl.CommandQueue:
+        """For kernels: in order, profiling on."""
+        with self._opening:
+            return self._queue
+
+    @property
+    def transfers(self) -> cl.CommandQueue:
+        """For what is read while kernels run: in their queue it would wait for the launch before or after."""
+        with self._opening:
+            return self._transfers
+
+    @cached_property
+    def _context(self) -> cl.Context:
         with self.failures("opening the device"):
             if self._make_context is not None:
                 return self._make_context(self.cl_device, self.properties)
@@ -118,16 +139,14 @@ class Device:
             return cl.Context([self.cl_device], properties=wanted)
 
     @cached_property
-    def queue(self) -> cl.CommandQueue:
-        """For kernels: in order, profiling on."""
+    def _queue(self) -> cl.CommandQueue:
         with self.failures("opening the device"):
-            return cl.CommandQueue(self.context, properties=cl.command_queue_properties.PROFILING_ENABLE)
+            return cl.CommandQueue(self._context, properties=cl.command_queue_properties.PROFILING_ENABLE)
 
     @cached_property
-    def transfers(self) -> cl.CommandQueue:
-        """For what is read while kernels run: in their queue it would wait for the launch before or after."""
+    def _transfers(self) -> cl.CommandQueue:
         with self.failures("opening the device"):
-            return cl.CommandQueue(self.context)
+            return cl.CommandQueue(self._context)
 
     def reopened(
         self,

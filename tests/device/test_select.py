@@ -6,13 +6,15 @@ import dataclasses
 import os
 import subprocess
 import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pyopencl as cl
 import pytest
 
 from clfractal.device import cache, select
-from clfractal.device.select import Device, DeviceInfo, choose, devices
+from clfractal.device.select import Device, DeviceInfo, Properties, choose, devices
 from clfractal.errors import DeviceError
 
 _BASE = DeviceInfo(
@@ -191,6 +193,22 @@ def test_keys_tell_drivers_apart() -> None:
         "a place in the list is no part of a device"
     )
     assert _POCL.key != dataclasses.replace(_POCL, target="pthread-x86_64-haswell").key
+
+
+def test_threads_that_open_a_device_at_the_same_time_share_its_context(device: Device) -> None:
+    opened: list[cl.Context] = []
+
+    def open_slowly(cl_device: cl.Device, properties: Properties) -> cl.Context:
+        time.sleep(0.05)  # a GPU takes longer still
+        opened.append(cl.Context([cl_device]))
+        return opened[-1]
+
+    shared = Device(device.info, device.cl_device, make_context=open_slowly)
+    with ThreadPoolExecutor(4) as pool:
+        queues = list(pool.map(lambda number: (shared.queue, shared.transfers)[number % 2], range(4)))
+    assert len(opened) == 1
+    assert len({queue.int_ptr for queue in queues}) == 2
+    assert all(queue.context == opened[0] for queue in queues)
 
 
 def test_memory_that_is_not_there_is_told_before(device: Device) -> None:
