@@ -73,6 +73,21 @@ def test_every_block_says_what_it_is(page: Path) -> None:
     assert words <= KNOWN
 
 
+def test_the_changelog_is_one_by_keep_a_changelog() -> None:
+    """https://keepachangelog.com/en/1.1.0: what comes next on top, versions with dates, six kinds of changes."""
+    lines = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8").splitlines()
+    versions = [line for line in lines if line.startswith("## ")]
+    assert versions[0] == "## [Unreleased]"
+    dated = [re.fullmatch(r"## \[\d+\.\d+\.\d+\] - (\d{4}-\d\d-\d\d)", line) for line in versions[1:]]
+    dates = [found[1] for found in dated if found is not None]
+    assert len(dates) == len(versions) - 1
+    assert dates == sorted(dates, reverse=True)
+    kinds = ["Added", "Changed", "Deprecated", "Removed", "Fixed", "Security"]
+    for version in re.split(r"^## ", "\n".join(lines), flags=re.MULTILINE)[1:]:
+        found = re.findall(r"^### (.*)$", version, re.MULTILINE)
+        assert found == [kind for kind in kinds if kind in found]
+
+
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "sh")], ids=name)
 def test_shell_code(page: Path, desk: Path) -> None:
     for file, text in steps(page):
