@@ -1,4 +1,4 @@
-"""What objects have in common, and shapes above all: where they stand, how they are joined, what is inside."""
+"""What objects have in common, above all shapes: where they stand, how they are joined, what is inside."""
 
 import math
 from abc import abstractmethod
