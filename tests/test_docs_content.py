@@ -475,6 +475,10 @@ def test_the_map_stays_a_map() -> None:
         page for page in PAGES if page.startswith("engineering/") and page not in text("architecture.md")
     ]
     assert missing == []
+    folders = {path.parent.name for path in PACKAGE.glob("*/__init__.py")}
+    assert folders <= {
+        name for row in table("architecture.md", "Folders") for name in re.findall(r"`(\w+)`", row[0])
+    }
 
 
 def test_the_list_of_modules_is_what_the_files_say() -> None:
