@@ -10,7 +10,6 @@ import numpy as np
 
 from clfractal.device.orbit import JOINS, SOLID_KINDS, Record, orbit_record
 from clfractal.device.structs import Precision
-from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.formulas.together import write_together
@@ -20,7 +19,7 @@ from clfractal.scene.objects import FormulaObject, ball_of_both
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.base import frame_of, length
-from clfractal.schema.shape import Ball, Joined, Solid, turned_axes
+from clfractal.schema.shape import Ball, Joined, Level, Simple, Solid, turned_axes
 
 # Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
 _BESIDE = 0.5
@@ -157,7 +156,8 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             chain, limit = scene.joined_chains[name], each.formula.iterations
             part |= formula(chain, each.scale, each.ball(chain.center, chain.radius))
         else:
-            part |= {"kind": SOLID_KINDS[each.tag], "step_scale": 1.0}
+            assert isinstance(each, Simple)
+            part |= {"kind": SOLID_KINDS[each.tag], "form": each.form, "step_scale": 1.0}
         found.append(orbit_record(chain, limit, precision, potential=potential, joined=part))
     return found
 
@@ -191,6 +191,6 @@ def _axes(each: Joined) -> dict[str, object]:
         axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
         sides = [length(axis) for axis in each.axes]
     else:
-        assert isinstance(each, PlaneObject)
+        assert isinstance(each, Level)
         axes, sides = [np.array(axis) for axis in frame_of(each.normal)], [1.0, 1.0, 1.0]
     return {"sides": sides, **dict(zip(("own_x", "own_y", "own_z"), axes, strict=True))}

@@ -1,4 +1,4 @@
-// Objects that shine, as paths ask for them: balls, boxes and cylinders beside the set, each as bright everywhere. (What is not is found by
+// Objects that shine, as paths ask for them: solids beside the set, each as bright everywhere. (What is not is found by
 // chance alone: see `clfractal/renderers/emitters.py`.)
 #include "emitter_places.h"
 

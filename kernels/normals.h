@@ -69,7 +69,7 @@ INLINE plane_sums plane_add(plane_sums s, mask found, vec p) {
 
 // N = (-p1, -p2, 1), normalised. `residual`: root mean square of the points' distances from the plane, scene units (0 where
 // not usable). Not usable: fewer than three points, points on one line as the viewer sees them.
-INLINE vec plane_normal(plane_sums s, real *residual, mask *usable) {
+INLINE vec normal_of_plane(plane_sums s, real *residual, mask *usable) {
     const real spread = s.xx * (R(1.0) + s.xy * s.xy) + s.yy;  // sums of squares of x and of y
     // One of the two is exactly 0 with fewer than three points; with none 0 / 0 is no number, which is above nothing.
     const mask planar = less((real)(THINNEST_PATTERN), (s.xx / spread) * (s.yy / spread));
@@ -97,7 +97,7 @@ INLINE vec compass_plane(const vec *compass, const mask *found, mask *usable) {
     #pragma unroll 1
     for (int i = 0; i < TURNS(9); ++i) sums = plane_add(sums, found[i], compass[i]);
     real residual;
-    return plane_normal(sums, &residual, usable);
+    return normal_of_plane(sums, &residual, usable);
 }
 
 // Where a normal is not `whole`, that of the plane of the points which are there.

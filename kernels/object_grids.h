@@ -163,7 +163,7 @@ INLINE mask polynomial_root(const real *c, real length, mask inside, mask here, 
 // How far along a ray the surface of a volume is, or the largest number: where the value passes the level, or where the box cuts what is
 // above it.
 INLINE real level_met(object_record o, __global const float *tables, vec origin, vec direction, real far) {
-    const span box = object_span(o, origin, direction);
+    const span box = object_span(o, 0, origin, direction);
     const grid_ray g = grid_ray_of(o, tables, box, origin, direction, far);
     const real voxel = (real)(o->voxel), level = (real)(o->level);
     mask active = less(box.entry, box.exit) & less(g.near, g.far);
@@ -219,5 +219,5 @@ INLINE vec level_normal(object_record o, __global const float *tables, vec own, 
         rise[axis] = pick(less(R(0.0), apart), (side[0] - side[1]) * middle / fmax(apart, R(1e-6)), R(0.0));
     }
     const mask wall = less(R(1.0) - slack, fmax(fmax(fabs(own.x), fabs(own.y)), fabs(own.z)));
-    return vec_pick(wall, box_normal(own), vec_of(rise[0], rise[1], rise[2]));
+    return vec_pick(wall, box_normal(vec_splat(o->form), own), vec_of(rise[0], rise[1], rise[2]));
 }

@@ -5,10 +5,10 @@
 
 INLINE vec object_own(object_record o, vec a) { return vec_along_axes(o, a); }
 
-// Where a ray enters and leaves what an object is, or the box of its grid.
-INLINE span object_span(object_record o, vec origin, vec direction) {
+// Where a ray enters and leaves what an object is, or the box of its grid. `number`: of one of its parts, which most shapes have one of.
+INLINE span object_span(object_record o, int number, vec origin, vec direction) {
     const vec from = object_own(o, vec_sub(origin, vec_splat(o->middle))), way = object_own(o, direction);
-    return shape_span(o->kind == OBJECT_VOLUME || o->kind == OBJECT_CLOUD ? SHAPE_BOX : o->kind, from, way);
+    return shape_span(o->kind == OBJECT_VOLUME || o->kind == OBJECT_CLOUD ? SHAPE_BOX : o->kind, vec_splat(o->form), number, from, way);
 }
 
 #include "object_grids.h"
@@ -21,16 +21,22 @@ INLINE int turn_to_meet(object_record o) {
 
 // Where a ray meets the object with index `i`, of which planes may leave a part only. `face`: the plane whose cut it meets there, or -1.
 INLINE real object_met(int i, vec origin, vec direction, object_record objects, plane_set planes, real *face) {
-    span s = object_span(objects + i, origin, direction);
-    real begins = R(-1.0), ends = R(-1.0);
-    for (int plane = 0; plane < planes.count; ++plane) {
-        if (!plane_cuts(planes.planes + plane, i)) continue;
-        const real exit = s.exit;
-        plane_cut(planes.planes + plane, plane, origin, direction, &s.entry, &s.exit, &begins);
-        ends = pick(less(s.exit, exit), (real)((scalar)plane), ends);
+    real nearest = (real)(REAL_LARGEST);
+    *face = R(-1.0);
+    for (int number = 0; number < objects[i].spans; ++number) {
+        span s = object_span(objects + i, number, origin, direction);
+        real begins = R(-1.0), ends = R(-1.0);
+        for (int plane = 0; plane < planes.count; ++plane) {
+            if (!plane_cuts(planes.planes + plane, i)) continue;
+            const real exit = s.exit;
+            plane_cut(planes.planes + plane, plane, origin, direction, &s.entry, &s.exit, &begins);
+            ends = pick(less(s.exit, exit), (real)((scalar)plane), ends);
+        }
+        const real first = span_first(s);
+        *face = pick(less(first, nearest), pick(less(R(0.0), s.entry), begins, ends), *face);
+        nearest = fmin(first, nearest);
     }
-    *face = pick(less(R(0.0), s.entry), begins, ends);
-    return span_first(s);
+    return nearest;
 }
 
 // Takes what a ray meets of an object, if that is the nearest so far.
@@ -65,7 +71,7 @@ CALLED real objects_met(const ray *r, object_record objects, plane_set planes, i
 // The normal at a place of an object's surface, length 1, away from its inside.
 INLINE vec object_normal(object_record o, vec point, __global const float *tables) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
-    vec n = shape_normal(o->kind, own);
+    vec n = shape_normal(o->kind, vec_splat(o->form), own);
     if (o->kind == OBJECT_WATER) n = water_normal(o, own.x, own.y);
     if (o->kind == OBJECT_VOLUME) {
         // What places are rounded to, in units of the box.
@@ -81,7 +87,7 @@ INLINE vec object_normal(object_record o, vec point, __global const float *table
 // (Of grids it stays as it was found.)
 INLINE vec object_place(object_record o, vec point) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
-    vec on = shape_on(o->kind, own);
+    vec on = shape_on(o->kind, vec_splat(o->form), own);
     real unused;
     if (o->kind == OBJECT_WATER) on.z = water_height(o, own.x, own.y, own, &unused);
     // Each of its axes is as long as a side, and its own number is the product with the axis by the side's square.
@@ -96,7 +102,7 @@ INLINE mask object_holds(object_record o, vec point) {
     const vec own = object_own(o, vec_sub(point, vec_splat(o->middle)));
     real unused;
     if (o->kind == OBJECT_WATER) return less(own.z, water_height(o, own.x, own.y, own, &unused));
-    return shape_holds(o->kind, own);
+    return shape_holds(o->kind, vec_splat(o->form), own);
 }
 
 // What a ray has met of the objects with these numbers: where that is the face of a cut its number, normal and place.

@@ -125,7 +125,7 @@ INLINE spot points_spot(stage s, const pixel_points *p, world w) {
     mask usable = less(R(1.0), R(0.0));
     if (w.settings->geometric) {
         real residual;
-        const vec plane = points_to_space(p, plane_normal(p->sums, &residual, &usable));
+        const vec plane = points_to_space(p, normal_of_plane(p->sums, &residual, &usable));
         here.residual = residual / p->cone;
         vec made = plane;
         if (w.settings->normal == NORMAL_ONE_TRIANGLE) made = points_to_space(p, triangle_normal(p->compass, p->compass_found, &usable));

@@ -1,4 +1,4 @@
-// Planes, balls, boxes and cylinders that are joined to formulas: how far a place is from one, and on which side. And what is known of
+// Shapes that are joined to formulas: how far a place is from one, and on which side. And what is known of
 // a place and any one solid.
 #include "shapes.h"
 
@@ -27,14 +27,14 @@ typedef struct {
 // How far a place is from a shape, in whose own units its sides are at -1 and 1; whether it is inside; and all that is known of it.
 INLINE real simple_far(orbit_record o, vec own) {
     vec ignored;
-    return shape_far(o->kind, own, vec_splat(o->sides), &ignored);
+    return shape_far(o->kind, vec_splat(o->form), own, vec_splat(o->sides), &ignored);
 }
 
 INLINE mask simple_holds(orbit_record o, vec own) { return less_equal(simple_far(o, own), R(0.0)); }
 
 INLINE void solid_simple(orbit_record o, vec own, solid_found *found) {
     vec n;
-    found->far = shape_far(o->kind, own, vec_splat(o->sides), &n);
+    found->far = shape_far(o->kind, vec_splat(o->form), own, vec_splat(o->sides), &n);
     found->inside = less_equal(found->far, R(0.0));
     found->surface.gradient = solid_turned(o, n);
 }

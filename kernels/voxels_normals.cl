@@ -133,7 +133,7 @@ INLINE void surface_normals(const lines *l, int exact, real side, vec *normal, m
             usable[p] &= less(R(0.5), vec_dot(normal[p], normal[p]));
         } else {
             real residual;
-            const vec plane = plane_normal(sums[p], &residual, &usable[p]);
+            const vec plane = normal_of_plane(sums[p], &residual, &usable[p]);
             normal[p] = vec_along(vec_along(vec_scale(l->out[p], plane.z), plane.x, across[p]), plane.y, up[p]);
         }
     }

@@ -6,7 +6,10 @@ import re
 from collections.abc import Iterator
 
 from clfractal.device.orbit import SHAPE_KINDS
+from clfractal.device.source import kinds
 from clfractal.resources import folder
+from clfractal.schema.kinds import members
+from clfractal.schema.shape import solids
 
 MOST_LINES = 80
 # A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.
@@ -43,15 +46,16 @@ def test_functions_are_counted() -> None:
 
 
 def test_each_shape_is_a_file_with_all_functions() -> None:
-    """The table of `shapes.h` has the kinds that records number, and for each a file with what is asked of shapes."""
+    """Shapes of scenes and of kernels are the same, and each has what is asked of it; solids, what paths ask for too."""
     kernels = folder("kernels")
-    text = (kernels / "shapes.h").read_text("utf-8")
-    table = re.search(r"^#define SHAPES\(DO\) (.*)$", text, re.MULTILINE)
-    assert table is not None
-    names = dict(re.findall(r"DO\((\w+), (\w+)\)", table[1]))
-    assert {kind.lower() for kind in names} == set(SHAPE_KINDS)
-    asked = re.findall(r"^//   \w+ NAME_(\w+)\(", text, re.MULTILINE)
-    assert len(asked) == 5
-    for name in names.values():
-        found = dict(functions((kernels / f"shape_{name}.h").read_text("utf-8")))
-        assert {f"{name}_{function}" for function in asked} <= set(found)
+    assert SHAPE_KINDS.keys() == {kind.tag for kind in members("shapes")}
+    assert kinds("elements/shapes/emitters").keys() == {kind.tag for kind in solids()}
+    for interface, family, count in (
+        ("shapes.h", "elements/shapes", 5),
+        ("emitter_places.h", "elements/shapes/emitters", 2),
+    ):
+        asked = re.findall(r"^//   \w+ NAME_(\w+)\(", (kernels / interface).read_text("utf-8"), re.MULTILINE)
+        assert len(asked) == count
+        for name in kinds(family):
+            found = dict(functions((kernels / family / f"{name}.h").read_text("utf-8")))
+            assert {f"{name}_{function}" for function in asked} <= set(found)

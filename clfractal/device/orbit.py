@@ -8,14 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.device.source import kinds
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.device.watched import CANCELLED
 from clfractal.formulas.language import Chain
 
 Record = np.ndarray[Any, np.dtype[np.void]]
 
-SHAPE_KINDS = {"plane": 1, "sphere": 2, "box": 3, "cylinder": 4}
-"""Shapes, of solids and of objects: as in the table of `kernels/shapes.h`."""
+SHAPE_KINDS = kinds("elements/shapes")
+"""Shapes, of solids and of objects."""
 SOLID_KINDS = {"formula": 0, **SHAPE_KINDS}
 JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
@@ -51,6 +52,7 @@ ORBIT = Struct(
         Field("own_y", "real", 3, ""),
         Field("own_z", "real", 3, ""),
         Field("sides", "real", 3, "of simple solids: half of them, scene units"),
+        Field("form", "real", 3, "of shapes: numbers of their own"),
         Field("scale", "real", 0, "from a distance of the formula's own to what rays may go in the scene"),
         Field("step_scale", "real", 0, "how much of its own distance that is"),
         Field("ball", "real", 3, "centre of a ball that holds the formula's set, scene units"),
@@ -62,7 +64,6 @@ ORBIT = Struct(
     ],
     kinds=[
         ("SOLID_FORMULA", SOLID_KINDS["formula"]),
-        *((f"SHAPE_{kind.upper()}", number) for kind, number in SHAPE_KINDS.items()),
         *((f"JOIN_{join.split('_')[0].upper()}", number) for join, number in JOINS.items()),
     ],
 )
@@ -82,7 +83,7 @@ _ALONE: dict[str, object] = {
     ),
     "solids": 1,
     **dict.fromkeys(("ball_radius", "reach", "potential_share", "smoothness"), 0.0),
-    **dict.fromkeys(("middle", "sides", "ball"), (0.0, 0.0, 0.0)),
+    **dict.fromkeys(("middle", "sides", "form", "ball"), (0.0, 0.0, 0.0)),
     "own_x": (1.0, 0.0, 0.0),
     "own_y": (0.0, 1.0, 0.0),
     "own_z": (0.0, 0.0, 1.0),

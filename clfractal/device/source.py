@@ -83,7 +83,8 @@ def flatten(
         kernels: another folder than the one that travels with the program.
 
     Every text is taken in once, where it is first included: an include that depends on `#if` is the only one of its
-    file. Quoted includes are looked for beside the including file, then in the kernels folder.
+    file. Quoted includes are looked for beside the including file, then in the kernels folder. Where they name a folder
+    all its files are taken in, and a list of them is defined: see `kinds`.
 
     Raises:
         KernelBuildError: an include cannot be found or is not quoted, with its file and line.
@@ -153,6 +154,8 @@ class _Flattener:
         found = (_found_once if self.shipped else _found)(self.kernels, name, beside)
         if found is not None:
             return found
+        if family := (_family_once if self.shipped else _family)(self.kernels, name):
+            return f"generated/{name}", family
         root = self.kernels.resolve()
         there = [path.relative_to(root).as_posix() for path in root.rglob("*.[ch]*")] + list(self.generated)
         guess = nearest(name, there)
@@ -174,6 +177,31 @@ def _found(kernels: Path, name: str, beside: str) -> tuple[str, str] | None:
 
 
 _found_once = lru_cache(maxsize=None)(_found)
+
+
+def kinds(family: str, kernels: Path | None = None) -> dict[str, int]:
+    """The kinds that a folder of kernels has files of, such as `elements/shapes`, each with its number from 1.
+
+    In C they are `SHAPE_BOX` and so on, and `SHAPES(DO)` is `DO(BOX, box) ...`. A folder in such a folder has more of
+    some of its kinds, under the same numbers.
+    """
+    files = sorted(((kernels or folder("kernels")) / family).glob("*.h"))
+    return {path.stem: number for number, path in enumerate(files, 1)}
+
+
+def _family(kernels: Path, name: str) -> str:
+    """The text that stands for a folder; "" if there is none."""
+    several = name.rpartition("/")[2].upper()
+    found = kinds(name, kernels)
+    lines = [f'#include "{name}/{kind}.h"' for kind in found]
+    if name.count("/") == 1:
+        one = several.removesuffix("S")
+        lines += [f"#define {one}_{kind.upper()} {number}" for kind, number in found.items()]
+    entries = " ".join(f"DO({kind.upper()}, {kind})" for kind in found)
+    return "\n".join([*lines, f"#define {several}(DO) {entries}"]) if found else ""
+
+
+_family_once = lru_cache(maxsize=None)(_family)
 
 
 @dataclass(frozen=True, slots=True)

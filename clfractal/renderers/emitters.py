@@ -15,9 +15,8 @@ from clfractal.schema.shape import Solid
 def asked_radiance(scene: Scene) -> list[Vector | None]:
     """Of each object the radiance, linear Rec. 709, with which paths ask for it; None where they do not.
 
-    Spheres, boxes and cylinders that stand beside the set are asked for where they shine the same everywhere. What differs
-    from place to place, blends, glass, which shines inside too, what planes cut, and what is joined to the set are found
-    by chance alone.
+    Solids that stand beside the set are asked for where they shine the same everywhere. What differs from place to
+    place, blends, glass, which shines inside too, what planes cut, and what is joined to the set are found by chance alone.
     """
     if not isinstance(scene.lighting, PathLighting):
         return [None] * len(scene.objects)

@@ -21,9 +21,9 @@ from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
 from clfractal.schema.base import Vector, frame_of, length
-from clfractal.schema.shape import AXES, Level, ObjectBase, Solid
+from clfractal.schema.shape import AXES, Level, ObjectBase, Simple, Solid
 
-_OTHER_KINDS = {"water": 0, "joined": 5, "volume": 6, "cloud": 7}
+_OTHER_KINDS = {"water": 0, "joined": -1, "volume": -2, "cloud": -3}
 OBJECT_KINDS = SHAPE_KINDS | _OTHER_KINDS
 # In footprints at `detail` 1: surfaces in grids are where a search has found them, and no equation tells how far off
 # that is.
@@ -57,6 +57,8 @@ OBJECT = Struct(
         Field("radiance", "real", 3, "of one that is asked for, linear Rec. 709"),
         Field("luminance", "real", 0, "of that"),
         Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
+        Field("form", "real", 3, "of a shape: numbers of its own"),
+        Field("spans", "int", 0, "in how many parts a line can be inside of it"),
         Field("lift", "real", 0, "how far over it rays leave it at least, in footprints"),
         Field("error_share", "real", 0, "of a place's largest coordinate, and ..."),
         Field(
@@ -150,6 +152,8 @@ def _place(scene: Scene, each: ObjectBase) -> dict[str, object]:
         "middle": each.position,
         **dict.fromkeys(("wave_x", "wave_y", "wave_height", "wave_phase"), nothing),
         "sides": (1.0, 1.0, 1.0),
+        "form": each.form if isinstance(each, Simple) else (0.0, 0.0, 0.0),
+        "spans": each.spans if isinstance(each, Simple) else 1,
         "lift": GRID_LIFT * scene.surface.detail if isinstance(each, VolumeObject) else 0.0,
         "error_share": 1.0,
         "error": max(map(abs, each.position)),

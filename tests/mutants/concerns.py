@@ -36,6 +36,7 @@ kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
 kernels/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/objects.h: render/objects render/objects_light
 kernels/shape*: render/objects render/joined render/emitter_places
+kernels/elements/shapes/*: render/objects render/joined render/emitter_places
 kernels/object_grids.h: render/object_grids render/turned_grids
 kernels/clouds.h: render/clouds
 kernels/medium_event.h: render/clouds render/volume_paths
