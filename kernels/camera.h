@@ -1,3 +1,4 @@
+// Rays of a view, through a lens or not.
 #include "view.h"
 
 // One View makes all rays: a plane with an eye behind it, at infinity for an orthographic camera.

@@ -1,3 +1,4 @@
+// What a march is after, and what it finds.
 #include "camera.h"
 
 // The result of a march.
