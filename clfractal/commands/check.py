@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     import numpy.typing as npt
 
     from clfractal.scene.animation import Animation
-    from clfractal.scene.tracks import Kind
+    from clfractal.schema.fields import Kind
 
 _MOST_KEYS = 12
 _WORDS: Mapping[Kind, str] = {

@@ -9,6 +9,7 @@ from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbit
 from clfractal.schema.base import (
     Angle,
     Coordinate,
+    Direction,
     Length,
     Position,
     Section,
@@ -18,6 +19,7 @@ from clfractal.schema.base import (
     minus,
     problem,
 )
+from clfractal.schema.fields import SCALE
 
 WORDS = ("orbit", "roll", "shift")
 """Keys of a camera that are other words for its position, target and up, and that films can move."""
@@ -35,7 +37,7 @@ class Orbit(Section):
     elevation: Annotated[float, Field(strict=True, ge=-90, le=90, allow_inf_nan=False)] | None = Field(
         None, description="angle towards `up`, degrees: 90 straight above the target; null: position's"
     )
-    distance: Length | None = Field(
+    distance: Annotated[Length, SCALE] | None = Field(
         None, description="from the target to the camera, scene units; null: position's"
     )
 
@@ -65,7 +67,7 @@ class CameraBase(Section):
     target: Position = Field(
         (0.0, 0.0, 0.0), description="the point in the middle of the picture, scene units"
     )
-    up: Position = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
+    up: Direction = Field((0.0, 0.0, 1.0), description="the direction that is up in the picture")
     orbit: Orbit | None = Field(
         default=None, exclude=True, description="angles and distance round the target, instead of position"
     )

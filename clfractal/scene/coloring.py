@@ -8,6 +8,7 @@ from pydantic import Field, Tag, model_validator
 from clfractal.schema.base import (
     Color,
     Coordinate,
+    Direction,
     Fraction,
     Length,
     Position,
@@ -16,6 +17,7 @@ from clfractal.schema.base import (
     length,
     problem,
 )
+from clfractal.schema.fields import Usual
 from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
 
 
@@ -81,7 +83,7 @@ class Trap(Section):
     center: Position = Field(
         (0.0, 0.0, 0.0), description="the point, a point of the axis or plane, or the sphere's centre"
     )
-    direction: Position = Field((0.0, 0.0, 1.0), description="the axis's direction, or the plane's normal")
+    direction: Direction = Field((0.0, 0.0, 1.0), description="the axis's direction, or the plane's normal")
     radius: Length = Field(1.0, description="the sphere's radius")
 
     @model_validator(mode="after")
@@ -105,8 +107,12 @@ class Coloring(Section):
         "solid", description="the quantity that chooses the colour"
     )
     palette: Palette = "viridis"
-    scale: Coordinate = Field(0.1, description="palette lengths per unit of the quantity")
-    offset: Coordinate = Field(0.0, description="position in the palette where the quantity is 0")
+    scale: Annotated[Coordinate, Usual(-2, 2)] = Field(
+        0.1, description="palette lengths per unit of the quantity"
+    )
+    offset: Annotated[Coordinate, Usual(-1, 1)] = Field(
+        0.0, description="position in the palette where the quantity is 0"
+    )
     repeat: bool = Field(
         True, description="true: the palette repeats; false: its first and last colour continue"
     )
@@ -114,7 +120,9 @@ class Coloring(Section):
         "normal",
         description="direction in which `thickness` (view or normal) or `layer_distance` is measured",
     )
-    layer: int = Field(1, ge=1, le=1_000_000, description="iterations of the other layer of `layer_distance`")
+    layer: Annotated[int, Usual(1, 64)] = Field(
+        1, ge=1, le=1_000_000, description="iterations of the other layer of `layer_distance`"
+    )
     step: Length | None = Field(
         None, description="step in that direction, scene units; null: 1/100 of the bounds' radius"
     )

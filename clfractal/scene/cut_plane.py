@@ -9,6 +9,7 @@ from clfractal.scene.objects import MAX_OBJECTS
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
+from clfractal.schema.fields import WHOLE, Usual
 from clfractal.schema.names import ObjectName
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -22,8 +23,12 @@ class EscapeColors(Section):
     curve: Literal["linear", "root", "log"] = Field(
         "linear", description="the quantity: count / limit, its square root, or log(count) / log(limit)"
     )
-    scale: Coordinate = Field(1.0, description="palette lengths between count 0 and the limit")
-    offset: Coordinate = Field(0.0, description="position in the palette where the quantity is 0")
+    scale: Annotated[Coordinate, Usual(-4, 4)] = Field(
+        1.0, description="palette lengths between count 0 and the limit"
+    )
+    offset: Annotated[Coordinate, Usual(-1, 1)] = Field(
+        0.0, description="position in the palette where the quantity is 0"
+    )
     repeat: bool = Field(
         False, description="true: the palette repeats; false: its first and last colour continue"
     )
@@ -44,7 +49,7 @@ class CutPlaneRenderer(Sampled):
     colors: EscapeColors = Field(
         default_factory=dict, validate_default=True, description="colours by escape counts"
     )
-    iterations: Iterations | None = Field(
+    iterations: Annotated[Iterations, Usual(1, 1000), WHOLE] | None = Field(
         None, description="maximum number of iterations on the plane; null: formula.iterations"
     )
     periodicity: bool = Field(
@@ -71,10 +76,10 @@ class CutPlane(Section):
     objects: Annotated[tuple[ObjectName, ...], Field(strict=False, max_length=MAX_OBJECTS)] = Field(
         (), description="with `cut`, what stands beside the set and this plane cuts too: names of `objects`"
     )
-    iterations: Iterations | None = Field(
+    iterations: Annotated[Iterations, Usual(1, 1000), WHOLE] | None = Field(
         None, description="maximum number of iterations on the plane; null: formula.iterations"
     )
-    count: int = Field(1, ge=1, le=256, description="number of parallel planes")
+    count: Annotated[int, Usual(1, 32)] = Field(1, ge=1, le=256, description="number of parallel planes")
     spacing: Coordinate = Field(
         0.1, description="distance between neighbouring planes along the normal, scene units"
     )

@@ -5,6 +5,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from clfractal.schema.base import Coordinate, Number, Section, problem
+from clfractal.schema.fields import PLACE, WHOLE, Usual
 
 MAX_LINKS = 64
 MAX_LIVE = 32
@@ -24,7 +25,7 @@ class _Source(Section):
     live: Live = Field(
         (), description="has no effect: the values of all parameters may change without compiling again"
     )
-    julia: Julia | None = Field(
+    julia: Annotated[Julia, PLACE] | None = Field(
         None, description="the constant to add instead of the point: one number for each variable"
     )
 
@@ -32,7 +33,9 @@ class _Source(Section):
 class ChainLink(_Source):
     """One member of a chain: a formula and how many times it is applied before the next one's turn."""
 
-    count: int = Field(1, ge=1, le=1000, description="number of applications before the next formula's turn")
+    count: Annotated[int, Usual(1, 10)] = Field(
+        1, ge=1, le=1000, description="number of applications before the next formula's turn"
+    )
     start: int = Field(
         0, ge=0, le=1_000_000, description="first application, counted from 0, in which it takes part"
     )
@@ -57,13 +60,13 @@ class FormulaSpec(_Source):
     chain: (
         Annotated[tuple[ChainLink, ...], Field(strict=False, min_length=1, max_length=MAX_LINKS)] | None
     ) = Field(None, description="formulas applied in turn")
-    iterations: int = Field(
+    iterations: Annotated[int, Usual(1, 1000), WHOLE] = Field(
         30, ge=1, le=MOST_ITERATIONS, description="maximum number of applications of the formula"
     )
-    bailout: Bailout | None = Field(
+    bailout: Annotated[Bailout, Usual(1, 1000)] | None = Field(
         None, description="escape radius for counts and inside tests; null: the formula's own"
     )
-    distance_bailout: Bailout | None = Field(
+    distance_bailout: Annotated[Bailout, Usual(1, 1000000.0)] | None = Field(
         None, description="escape radius for distances; null: the formula's own, or 1000"
     )
 

@@ -5,6 +5,7 @@ from typing import Annotated, Literal
 from pydantic import Field, Tag
 
 from clfractal.schema.base import Section, chosen_by
+from clfractal.schema.fields import Usual
 
 MAX_BOUNCES = 256
 
@@ -21,23 +22,23 @@ class PathLighting(Section):
 
     tag = "path"
     mode: Literal["path"] = "path"
-    bounces: int = Field(
+    bounces: Annotated[int, Usual(0, 16)] = Field(
         8, ge=0, le=MAX_BOUNCES, description="most bounces of a path after the first surface"
     )
-    roulette: int = Field(
+    roulette: Annotated[int, Usual(0, 16)] = Field(
         3,
         ge=0,
         le=MAX_BOUNCES,
         description="bounces after which paths that carry little light end by chance; the mean stays the same",
     )
-    detail: float = Field(
+    detail: Annotated[float, Usual(0.01, 1)] = Field(
         0.02,
         ge=0.01,
         le=1,
         description="part of `renderer.detail` to which all rays of a surface's paths find it; 1: faster, and"
         " too bright in hollows finer than some pixels",
     )
-    clamp: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+    clamp: Annotated[float, Field(strict=True, gt=0, le=1e6), Usual(0.5, 100)] | None = Field(
         None,
         description="most light that one bounce of a sample may add; less noise, but too dark; null: no limit",
     )

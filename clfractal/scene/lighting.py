@@ -11,6 +11,7 @@ from clfractal.schema.base import (
     Amount,
     Color,
     Coordinate,
+    Direction,
     Fraction,
     Length,
     Position,
@@ -23,6 +24,7 @@ from clfractal.schema.base import (
     problem,
     unit,
 )
+from clfractal.schema.fields import Usual
 
 MAX_LIGHTS = 64
 MAX_PLACES = 20_000
@@ -32,13 +34,13 @@ class LightBase(Section):
     """Keys that every light has."""
 
     color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
-    temperature: Annotated[float, Field(strict=True, ge=1000, le=40000)] | None = Field(
+    temperature: Annotated[float, Field(strict=True, ge=1000, le=40000), Usual(1500, 12000)] | None = Field(
         None,
         description="kelvin: the colour of a black body, of luminance 1, in place of `color`; null: `color`",
     )
-    intensity: Amount = Field(1.0, description="factor on the colour")
+    intensity: Annotated[Amount, Usual(0, 4)] = Field(1.0, description="factor on the colour")
     shadow: bool = Field(True, description="whether the set blocks this light")
-    rays: Annotated[int, Field(strict=True, ge=1, le=1024)] | None = Field(
+    rays: Annotated[int, Field(strict=True, ge=1, le=1024), Usual(1, 64)] | None = Field(
         None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
     )
 
@@ -69,7 +71,7 @@ class LightBase(Section):
 class SmallLight(LightBase):
     """A light that has one direction at each place, or about one."""
 
-    angular_size: float = Field(
+    angular_size: Annotated[float, Usual(0, 45)] = Field(
         0.0,
         ge=0,
         le=170,
@@ -87,7 +89,7 @@ class DirectionalLight(SmallLight):
 
     tag = "directional"
     type: Literal["directional"] = "directional"
-    direction: Position = Field((-1.0, 1.0, -1.0), description="direction in which the light travels")
+    direction: Direction = Field((-1.0, 1.0, -1.0), description="direction in which the light travels")
 
     @model_validator(mode="after")
     def _goes_somewhere(self) -> Self:
@@ -113,7 +115,7 @@ class SpotLight(SmallLight):
     tag = "spot"
     type: Literal["spot"] = "spot"
     position: Position = Field(description="scene units")
-    direction: Position = Field(
+    direction: Direction = Field(
         (0.0, 0.0, -1.0), description="axis of the cone, along which the light travels"
     )
     angle: float = Field(40.0, gt=0, le=180, description="full angle of the cone, degrees")
@@ -147,8 +149,8 @@ class RectangleLight(LightBase):
     tag = "rectangle"
     type: Literal["rectangle"] = "rectangle"
     position: Position = Field(description="its middle, scene units")
-    direction: Position = Field((0.0, 0.0, -1.0), description="where its shining side looks to")
-    up: Position = Field((0.0, 1.0, 0.0), description="about along its height; not along `direction`")
+    direction: Direction = Field((0.0, 0.0, -1.0), description="where its shining side looks to")
+    up: Direction = Field((0.0, 1.0, 0.0), description="about along its height; not along `direction`")
     width: Length = Field(1.0, description="scene units")
     height: Length = Field(1.0, description="scene units")
     visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
@@ -175,6 +177,7 @@ class SetLight(LightBase):
 
     tag = "set"
     type: Literal["set"] = "set"
+    intensity: Amount = Field(1.0, description="factor on the colour")
     trap: Trap = Field(
         default_factory=dict,
         validate_default=True,
@@ -253,14 +256,14 @@ class Environment(Section):
         None, description="a latitude-longitude EXR or HDR picture, in the scene's folder or below"
     )
     sky: Sky | None = Field(None, description="a physical sky")
-    intensity: Amount = Field(1.0, description="factor on the environment's light")
-    rotation: float = Field(
+    intensity: Annotated[Amount, Usual(0, 4)] = Field(1.0, description="factor on the environment's light")
+    rotation: Annotated[float, Usual(-180, 180)] = Field(
         0.0, ge=-360, le=360, description="rotation of the environment about the z axis, degrees"
     )
     background: bool = Field(
         True, description="true: visible behind the set; false: `background` is visible there"
     )
-    rays: int = Field(
+    rays: Annotated[int, Usual(0, 64)] = Field(
         8, ge=0, le=1024, description="rays per sample for the environment's light; 0: it lights nothing"
     )
 
@@ -297,7 +300,7 @@ class Fog(Section):
     """Fog absorbs light on its way to the eye and replaces it by its own colour, exponentially with distance."""
 
     color: Color = Field((0.5, 0.55, 0.6), description="linear Rec. 709")
-    density: float = Field(
+    density: Annotated[float, Usual(0.001, 10)] = Field(
         0.1, ge=0, le=1e6, description="per scene unit; the fraction exp(-density * distance) of light passes"
     )
     height: Length | None = Field(
@@ -307,7 +310,9 @@ class Fog(Section):
     base: Coordinate = Field(
         0.0, description="how far up from the origin the fog has this density, with `height`, scene units"
     )
-    up: Position = Field((0.0, 0.0, 1.0), description="the direction in which it gets thinner, with `height`")
+    up: Direction = Field(
+        (0.0, 0.0, 1.0), description="the direction in which it gets thinner, with `height`"
+    )
     scattering: Scattering | None = Field(
         None, description="shafts of light: what the fog scatters of each light; null: `color` alone"
     )

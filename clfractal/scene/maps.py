@@ -10,6 +10,7 @@ from clfractal.scene.coloring import Palette, Trap, check_order
 from clfractal.schema.base import (
     Amount,
     Coordinate,
+    Direction,
     Fraction,
     Length,
     Number,
@@ -19,6 +20,7 @@ from clfractal.schema.base import (
     length,
     problem,
 )
+from clfractal.schema.fields import Usual
 
 QUANTITIES = (
     "iterations",
@@ -56,17 +58,19 @@ class Map(Section):
         None, description="quantities at its beginning and end; null: [-1, 1] of a normal, else [0, 1]"
     )
     repeat: bool = Field(False, description="true: it repeats; false: beyond the range its ends continue")
-    direction: Position = Field(
+    direction: Direction = Field(
         (0.0, 0.0, 1.0), description="for `normal` and `height`; its length is of no account"
     )
     center: Position = Field((0.0, 0.0, 0.0), description="for `distance`, scene units")
-    layer: int = Field(1, ge=1, le=1_000_000, description="iterations of the other layer of `layer_distance`")
+    layer: Annotated[int, Usual(1, 64)] = Field(
+        1, ge=1, le=1_000_000, description="iterations of the other layer of `layer_distance`"
+    )
     step: Length | None = Field(
         None,
         description="for `curvature`, `thickness`, `layer_distance`, scene units; null: 1/100 of the bounds' radius",
     )
     trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape for `by: trap`")
-    scale: Length = Field(1.0, description="width of the texture, scene units")
+    scale: Annotated[Length, Usual(0.01, 10)] = Field(1.0, description="width of the texture, scene units")
     sharpness: Annotated[float, Field(strict=True, ge=1, le=64)] = Field(
         4.0, description="how narrow the seams between the texture's three sides are"
     )

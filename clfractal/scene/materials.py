@@ -6,6 +6,7 @@ from pydantic import Field, Tag, model_validator
 
 from clfractal.scene.maps import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
 from clfractal.schema.base import Color, Coordinate, Length, problem
+from clfractal.schema.fields import Usual
 from clfractal.schema.names import MaterialName
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]
@@ -40,7 +41,7 @@ class Specular(Mapped):
     weight: FractionMap = Field(1.0, description="factor on the reflectance of a dielectric, straight on")
     color: ReflectanceMap = Field(WHITE, description="a dielectric's tint; a metal's at its edges")
     roughness: FractionMap = Field(0.3, description="0: a mirror, 1: no highlight")
-    ior: IorMap = Field(1.5, description="index of refraction of a dielectric")
+    ior: Annotated[IorMap, Usual(1, 3)] = Field(1.5, description="index of refraction of a dielectric")
 
 
 class Coat(Mapped):
@@ -49,7 +50,7 @@ class Coat(Mapped):
     weight: FractionMap = Field(0.0, description="part of the surface that has it")
     color: ReflectanceMap = Field(WHITE, description="what passes through it, there and back")
     roughness: FractionMap = Field(0.0, description="of its highlight")
-    ior: IorMap = Field(1.6, description="index of refraction")
+    ior: Annotated[IorMap, Usual(1, 3)] = Field(1.6, description="index of refraction")
     darkening: FractionMap = Field(
         1.0, description="how much the body is darkened by light that the coat throws back to it"
     )
@@ -116,17 +117,17 @@ class Subsurface(Mapped):
 class Emission(Mapped):
     """Light of the material's own."""
 
-    luminance: AmountMap = Field(0.0, description="radiance, as of `background`")
+    luminance: Annotated[AmountMap, Usual(0, 4)] = Field(0.0, description="radiance, as of `background`")
     color: ShineMap = Field(WHITE, description="factor on the luminance, linear Rec. 709")
 
 
 class Bump(Mapped):
     """A relief that only light sees: the surface stays where it is, and its shading normal is that of the relief."""
 
-    height: HeightMap = Field(
+    height: Annotated[HeightMap, Usual(-0.1, 0.1)] = Field(
         0.0, description="of the relief over the surface, scene units; below 0: in it; only slopes are seen"
     )
-    width: Length | None = Field(
+    width: Annotated[Length, Usual(0.001, 1)] | None = Field(
         None,
         description="least distance over which slopes are measured, scene units; null: a pixel's, or a texture's",
     )

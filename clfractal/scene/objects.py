@@ -10,10 +10,10 @@ from clfractal.scene.volume import Transfer
 from clfractal.schema.base import (
     Amount,
     Coordinate,
+    Direction,
     Fraction,
     Length,
     Number,
-    Position,
     Section,
     Vector,
     cross,
@@ -21,6 +21,7 @@ from clfractal.schema.base import (
     problem,
     unit,
 )
+from clfractal.schema.fields import SCALE, Usual
 from clfractal.schema.kinds import in_order, members, one_of
 from clfractal.schema.names import ObjectName
 from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, turned_axes
@@ -40,9 +41,13 @@ class Waves(Section):
     height: Amount = Field(
         0.1, description="mean of the highest third of waves, from trough to crest, scene units; 0: flat"
     )
-    length: Length = Field(1.0, description="about the distance between the largest crests, scene units")
-    direction: Position = Field((1.0, 0.0, 0.0), description="where they travel to; not along the normal")
-    spread: float = Field(30.0, ge=0, le=180, description="how far their directions differ from it, degrees")
+    length: Annotated[Length, SCALE] = Field(
+        1.0, description="about the distance between the largest crests, scene units"
+    )
+    direction: Direction = Field((1.0, 0.0, 0.0), description="where they travel to; not along the normal")
+    spread: Annotated[float, Usual(0, 90)] = Field(
+        30.0, ge=0, le=180, description="how far their directions differ from it, degrees"
+    )
     choppiness: Fraction = Field(0.5, description="0: crests are as round as troughs; 1: they are sharper")
     seed: int = Field(0, ge=0, le=2**31 - 1, description="chooses the waves")
     time: Coordinate = Field(0.0, description="seconds, if scene units are metres")
@@ -91,7 +96,7 @@ class FormulaObject(Joined):
     rotation: Angles = Field(
         (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
     )
-    scale: Length = Field(1.0, description="factor on the formula's own size")
+    scale: Annotated[Length, SCALE] = Field(1.0, description="factor on the formula's own size")
 
     def own_place(self, point: Vector) -> Vector:
         """A point in the formula's own space."""
@@ -120,13 +125,15 @@ class VolumeObject(ObjectBase):
     place = 90
     type: Literal["volume"] = "volume"
     file: str = Field(min_length=1, description="its values: a NRRD or NPY file beside the scene")
-    size: Length | None = Field(
+    size: Annotated[Length, SCALE] | None = Field(
         None, description="how long its longest side is, scene units; null: as the file says"
     )
     rotation: Angles = Field(
         (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
     )
-    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
+    scale: Annotated[Sides, SCALE] = Field(
+        (1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated"
+    )
     level: Number | None = Field(
         None, description="value at the surface; null: the middle of the range of values"
     )

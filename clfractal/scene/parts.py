@@ -24,6 +24,7 @@ from clfractal.schema.base import (
     minus,
     problem,
 )
+from clfractal.schema.fields import SCALE, Usual
 from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
 from clfractal.schema.names import MaterialName
 
@@ -72,13 +73,15 @@ class PerspectiveCamera(CameraBase):
 
     tag = "perspective"
     projection: Literal["perspective"] = "perspective"
-    fov: float = Field(45.0, ge=1e-6, lt=180, description="vertical angle of view, degrees")
-    f_number: Annotated[float, Field(strict=True, ge=0.01, le=1e6)] | None = Field(
+    fov: Annotated[float, Usual(5, 120), SCALE] = Field(
+        45.0, ge=1e-6, lt=180, description="vertical angle of view, degrees"
+    )
+    f_number: Annotated[float, Field(strict=True, ge=0.01, le=1e6), Usual(0.5, 64), SCALE] | None = Field(
         None, description="focal length divided by the lens's diameter; null: a pinhole, all is sharp"
     )
     # Its lower bound is checked below, to say what is wrong with a negative one.
     focus_distance: (
-        Annotated[float, Field(strict=True, le=1e6, json_schema_extra={"exclusiveMinimum": 0})] | None
+        Annotated[float, Field(strict=True, le=1e6, json_schema_extra={"exclusiveMinimum": 0}), SCALE] | None
     ) = Field(
         None, description="distance that is sharp, along the view axis, scene units; null: the target's"
     )
@@ -138,7 +141,9 @@ class OrthographicCamera(CameraBase):
 
     tag = "orthographic"
     projection: Literal["orthographic"] = "orthographic"
-    height: float = Field(3.0, ge=1e-12, le=1e6, description="height of the picture, scene units")
+    height: Annotated[float, SCALE] = Field(
+        3.0, ge=1e-12, le=1e6, description="height of the picture, scene units"
+    )
 
 
 AnyCamera: TypeAlias = PerspectiveCamera | OrthographicCamera
@@ -157,10 +162,16 @@ class Material(Section):
     color: Reflectance = Field(
         (0.8, 0.7, 0.6), description="linear Rec. 709; replaced by a coloring other than solid"
     )
-    ambient: Amount = Field(0.1, description="part of each light that reaches everywhere, shadows too")
-    diffuse: Amount = Field(0.9, description="part of the light that is scattered")
-    specular: Amount = Field(0.3, description="part of the light that is mirrored as a highlight")
-    shininess: float = Field(30.0, ge=0.1, le=1e5, description="exponent of the highlight")
+    ambient: Annotated[Amount, Usual(0, 1)] = Field(
+        0.1, description="part of each light that reaches everywhere, shadows too"
+    )
+    diffuse: Annotated[Amount, Usual(0, 1)] = Field(0.9, description="part of the light that is scattered")
+    specular: Annotated[Amount, Usual(0, 1)] = Field(
+        0.3, description="part of the light that is mirrored as a highlight"
+    )
+    shininess: Annotated[float, Usual(1, 1000)] = Field(
+        30.0, ge=0.1, le=1e5, description="exponent of the highlight"
+    )
     reflection: Fraction = Field(0.0, description="part of the surroundings that is mirrored sharply")
 
 
@@ -214,7 +225,7 @@ def _with_layers(schema: dict[str, Any]) -> None:
 class Output(Section):
     """What the picture files contain."""
 
-    exposure: Exposure = Field(
+    exposure: Annotated[Exposure, Usual(-5, 5)] = Field(
         0.0,
         description="stops: colours on a screen are multiplied by 2**exposure; auto: chosen by a quick look at the scene",
     )

@@ -9,6 +9,7 @@ from pydantic import Field, model_validator
 from clfractal.schema.base import (
     Angle,
     Coordinate,
+    Direction,
     Length,
     Position,
     Section,
@@ -21,6 +22,7 @@ from clfractal.schema.base import (
     turn,
     unit,
 )
+from clfractal.schema.fields import SCALE
 
 Factor = Annotated[float, Field(strict=True, gt=0, le=1e12, allow_inf_nan=False)]
 MOVES = ("scale", "move_normal", "move_side", "move_up", "rotate_normal", "rotate_side", "rotate_up")
@@ -32,7 +34,9 @@ LARGEST, SMALLEST = 1e6, 1e-18
 class Transform(Section):
     """One step that scales, moves or rotates a plane; exactly one key is given."""
 
-    scale: Factor | None = Field(None, description="factor on width and height; the centre stays")
+    scale: Annotated[Factor, SCALE] | None = Field(
+        None, description="factor on width and height; the centre stays"
+    )
     move_normal: Coordinate | None = Field(None, description="shift along the normal, scene units")
     move_side: Coordinate | None = Field(None, description="shift to the plane's right, scene units")
     move_up: Coordinate | None = Field(None, description="shift towards the plane's top, scene units")
@@ -57,12 +61,12 @@ class Plane(Section):
     """A rectangle that faces its normal; `side` = up x normal is its right."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="the plane's middle, scene units")
-    normal: Position = Field((0.0, 0.0, 1.0), description="direction towards the viewer")
-    up: Position | None = Field(
+    normal: Direction = Field((0.0, 0.0, 1.0), description="direction towards the viewer")
+    up: Direction | None = Field(
         None, description="direction towards the plane's top; null: y, or z where the normal is nearly y"
     )
-    width: Length = Field(4.0, description="scene units")
-    height: Length = Field(4.0, description="scene units")
+    width: Annotated[Length, SCALE] = Field(4.0, description="scene units")
+    height: Annotated[Length, SCALE] = Field(4.0, description="scene units")
     corners: Annotated[tuple[Position, Position, Position], Field(strict=False)] | None = Field(
         None, description="lower left, lower right and upper left corner, instead of all keys above"
     )

@@ -5,6 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.schema.base import Section, problem
+from clfractal.schema.fields import Usual
 
 # The default of `min_samples`: fewer samples do not show how much a pixel's samples scatter.
 USUAL_MIN_SAMPLES = 16
@@ -13,18 +14,20 @@ USUAL_MIN_SAMPLES = 16
 class Sampled(Section):
     """Samples, their filter, and the number type."""
 
-    samples: int = Field(1, ge=1, le=65_536, description="rays per pixel; with `noise` their maximum number")
-    noise: Annotated[float, Field(strict=True, gt=0, le=1)] | None = Field(
+    samples: Annotated[int, Usual(1, 1024)] = Field(
+        1, ge=1, le=65_536, description="rays per pixel; with `noise` their maximum number"
+    )
+    noise: Annotated[float, Field(strict=True, gt=0, le=1), Usual(0.001, 0.1)] | None = Field(
         None,
         description="a pixel gets no more samples once its standard error is below this; null: it gets all",
     )
-    min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536)] | None = Field(
+    min_samples: Annotated[int, Field(strict=True, ge=4, le=65_536), Usual(4, 256)] | None = Field(
         None, description="samples before the noise of a pixel is judged; null: 16, or all if fewer"
     )
     filter: Literal["box", "tent", "blackman_harris"] = Field(
         "box", description="how samples are spread around a pixel's middle"
     )
-    filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16)] | None = Field(
+    filter_width: Annotated[float, Field(strict=True, ge=0.1, le=16), Usual(0.5, 6)] | None = Field(
         None, description="the filter's width, pixels; null: box 1, tent 2, blackman_harris 3"
     )
     seed: int = Field(

@@ -7,7 +7,8 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.errors import SceneError, Where
-from clfractal.schema.base import Position, Reflectance, Section, cross, length, problem
+from clfractal.schema.base import Direction, Position, Reflectance, Section, cross, length, problem
+from clfractal.schema.fields import SCALE, Usual
 
 # Screen, distance and eyes are measured in one unit, so their ratios cannot be larger than this.
 MAX_RATIO = 10_000
@@ -59,10 +60,12 @@ class StereoPlane(Section):
     """The rectangle in space that lies on the screen."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="the plane's middle, scene units")
-    normal: Position = Field((0.0, -1.0, 0.0), description="direction towards the viewer")
-    up: Position = Field((0.0, 0.0, 1.0), description="direction towards the plane's top")
-    width: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] = Field(4.0, description="scene units")
-    height: Annotated[float, Field(strict=True, ge=1e-18, le=1e6)] | None = Field(
+    normal: Direction = Field((0.0, -1.0, 0.0), description="direction towards the viewer")
+    up: Direction = Field((0.0, 0.0, 1.0), description="direction towards the plane's top")
+    width: Annotated[float, Field(strict=True, ge=1e-18, le=1e6), SCALE] = Field(
+        4.0, description="scene units"
+    )
+    height: Annotated[float, Field(strict=True, ge=1e-18, le=1e6), SCALE] | None = Field(
         None, description="scene units; null: the height that makes pixels square on the screen"
     )
 
@@ -84,13 +87,13 @@ class Stereo(Section):
     """
 
     mode: Mode = Field("split", description="how the pair is shown")
-    screen_width: Positive = Field(
+    screen_width: Annotated[Positive, Usual(0.1, 10)] = Field(
         0.52, description="width of the picture on the real screen, in any unit of length"
     )
-    screen_distance: Positive = Field(
+    screen_distance: Annotated[Positive, Usual(0.2, 20)] = Field(
         0.6, description="distance from the viewer's eyes to the screen, in the same unit"
     )
-    interpupillary_distance: Positive = Field(
+    interpupillary_distance: Annotated[Positive, Usual(0.02, 0.1)] = Field(
         0.063, description="distance between the viewer's pupils, in the same unit"
     )
     swap: bool = Field(False, description="exchange the places of the two eyes in the picture")
@@ -101,13 +104,13 @@ class Stereo(Section):
         "off_axis",
         description="how the eyes are aimed: off_axis is right for a screen, the others are for comparison",
     )
-    separation: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False)] = Field(
+    separation: Annotated[float, Field(strict=True, ge=0, le=10, allow_inf_nan=False), Usual(0, 3)] = Field(
         1.0, description="distance between the viewpoints; 1 is the viewer's interpupillary distance"
     )
     fit: Literal["auto"] | None = Field(
         None, description="auto: plane and separation are chosen so that the depth fits the budget"
     )
-    budget: Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False)] = Field(
+    budget: Annotated[float, Field(strict=True, gt=0, le=10, allow_inf_nan=False), Usual(0.1, 3)] = Field(
         1.0, description="largest parallax that `fit` allows, degrees"
     )
     method: Literal["color", "half_color", "gray", "dubois"] = Field(

@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Length, Position, Section, problem
+from clfractal.schema.fields import SCALE, Usual
 
 # Normals that need a middle point and its eight neighbours, so a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
@@ -17,7 +18,7 @@ class Ball(Section):
     """A ball in space that contains everything visible."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    radius: Length = Field(description="scene units")
+    radius: Annotated[Length, SCALE] = Field(description="scene units")
 
 
 class Points(Section):
@@ -39,7 +40,9 @@ class Points(Section):
 class AmbientOcclusion(Section):
     """How much of its surroundings a point of the surface sees."""
 
-    rays: int = Field(8, ge=1, le=1024, description="rays into the hemisphere per sample")
+    rays: Annotated[int, Usual(1, 64)] = Field(
+        8, ge=1, le=1024, description="rays into the hemisphere per sample"
+    )
     distance: Length | None = Field(
         None, description="distance up to which obstacles count, scene units; null: half the bounds' radius"
     )
@@ -73,19 +76,19 @@ class SurfaceRenderer(Sampled):
         "gradient",
         description="where normals come from: the Jacobian at the surface, or farther out, or the pixel's points",
     )
-    detail: float = Field(
+    detail: Annotated[float, Usual(0.1, 10)] = Field(
         1.0, ge=0.01, le=100, description="distance that counts as a hit, in pixel footprints"
     )
-    max_steps: int = Field(
+    max_steps: Annotated[int, Usual(50, 20000)] = Field(
         1000, ge=1, le=100_000, description="maximum number of distance evaluations along a ray"
     )
-    over_relaxation: float = Field(
+    over_relaxation: Annotated[float, Usual(1, 1.99)] = Field(
         3.0,
         ge=1,
         le=4,
         description="most that a step may exceed the distance; a step is taken back where it was unsafe",
     )
-    step_scale: Annotated[float, Field(strict=True, gt=0, le=2)] | None = Field(
+    step_scale: Annotated[float, Field(strict=True, gt=0, le=2), Usual(0.05, 1)] | None = Field(
         None, description="factor on estimated distances; null: the formula's own"
     )
     bounds: Ball | None = Field(
@@ -95,7 +98,7 @@ class SurfaceRenderer(Sampled):
     ambient_occlusion: AmbientOcclusion | None = Field(
         None, description="darkens hollows, which little light reaches; null: none"
     )
-    firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6)] | None = Field(
+    firefly_limit: Annotated[float, Field(strict=True, gt=0, le=1e6), Usual(0.5, 100)] | None = Field(
         10.0,
         description="most light that one sample's mirrored or environment rays may add; null: no limit",
     )

@@ -2,62 +2,19 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any
 
-from clfractal.elements.shapes.box import BoxObject
-from clfractal.elements.shapes.cylinder import CylinderObject
-from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.errors import SceneError, unknown_name
 from clfractal.files.marks import split_path
 from clfractal.scene.camera_base import WORDS, CameraBase, Orbit
-from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject, VolumeObject, Waves
-from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
-from clfractal.scene.plane import Plane, Transform
-from clfractal.scene.stereo import StereoPlane
-from clfractal.scene.surface import Ball
-from clfractal.scene.volume import Box, Zoom
+from clfractal.scene.objects import FormulaObject
+from clfractal.scene.volume import Box
 from clfractal.schema.base import Section
-from clfractal.schema.shape import Joined, Solid
+from clfractal.schema.fields import SCALE, WHOLE, Kind, Moves, known
 
-Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color"]
-"""How a value goes from key to key.
-
-`number`: as it is, angles too, which are never wrapped; `whole`: the same, then rounded; `scale`: in the logarithm;
-`place`: on a path in space; `direction`: on the sphere; `color`: each component as a number.
-"""
-
-# What is a factor to the eye, so that equal factors in equal times look even.
-_SCALES: tuple[tuple[type[Section], frozenset[str]], ...] = (
-    (PerspectiveCamera, frozenset({"fov", "focus_distance", "f_number"})),
-    (OrthographicCamera, frozenset({"height"})),
-    (Orbit, frozenset({"distance"})),
-    (Ball, frozenset({"radius"})),
-    (Box, frozenset({"size"})),
-    (Zoom, frozenset({"scale"})),
-    (Plane, frozenset({"width", "height"})),
-    (Transform, frozenset({"scale"})),
-    (StereoPlane, frozenset({"width", "height"})),
-    (Solid, frozenset({"scale"})),
-    (FormulaObject, frozenset({"scale"})),
-    (VolumeObject, frozenset({"size", "scale"})),
-    (Joined, frozenset({"smoothness"})),
-    (SphereObject, frozenset({"radius"})),
-    (BoxObject, frozenset({"size"})),
-    (CylinderObject, frozenset({"radius", "height"})),
-    (Waves, frozenset({"length"})),
-)
-_DIRECTIONS = frozenset({"direction", "normal", "up"})
-_PLACES = frozenset({"position", "target", "center", "julia"})
-# Whole numbers between which a picture's subject changes, and not how it is made.
-_WHOLE: tuple[tuple[type[Section], str], ...] = (
-    (FormulaSpec, "iterations"),
-    (CutPlaneRenderer, "iterations"),
-    (CutPlane, "iterations"),
-)
 # Mappings of sections, and what they hold.
 _NAMED = {"objects": "object", "materials": "material"}
 # Sections that say what a film is, and not what is in its pictures.
@@ -180,23 +137,21 @@ def _unknown(part: str, shown: str, known: Sequence[str]) -> str:
 
 def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
     """How the value moves; SceneError if it does not."""
-    key = path[-1]
+    key, moves = path[-1], None
     if path[-2:-1] == ("parameters",):
         return "whole" if _is_whole(scene, path) else "number"
     if isinstance(owner, Section):
-        if any(isinstance(owner, cls) and key == name for cls, name in _WHOLE):
-            return "whole"
-        if any(isinstance(owner, cls) and key in keys for cls, keys in _SCALES):
-            return "scale"
+        moves = known(type(owner), key, Moves)
+        if moves is not None and moves in (SCALE, WHOLE):
+            return moves.kind
         if value is None:
             annotation = str(type(owner).model_fields[key].annotation)
             if "float" not in annotation or "Literal" in annotation:
                 raise SceneError("cannot move: it is null, and would be no number")
-            several = "tuple" in annotation
-            return "direction" if key in _DIRECTIONS else "place" if several else "number"
+            return moves.kind if moves is not None else "place" if "tuple" in annotation else "number"
     if isinstance(value, (Section, Mapping)):
-        known = _keys_of(value) if isinstance(value, Section) else list(value)
-        listing = f"keys, {', '.join(known)}" if known else f"values, such as {'.'.join(path)}.NAME"
+        keys = _keys_of(value) if isinstance(value, Section) else list(value)
+        listing = f"keys, {', '.join(keys)}" if keys else f"values, such as {'.'.join(path)}.NAME"
         raise SceneError(f"cannot move as a whole: name one of its {listing}")
     if isinstance(value, str) and not (isinstance(owner, Section) and key == "exposure"):
         raise SceneError(f"cannot move: it is a word, {value[:40]!r}")
@@ -207,7 +162,7 @@ def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
     if isinstance(value, tuple):
         if not value or not all(isinstance(entry, float) for entry in value):
             raise SceneError("cannot move as a whole: name one of its entries, from 0 on")
-        return "direction" if key in _DIRECTIONS else "place" if key in _PLACES else "color"
+        return moves.kind if moves is not None else "color"
     return "number"
 
 

@@ -8,6 +8,7 @@ from pydantic import Field, Tag, model_validator
 from clfractal.errors import SceneError, Where
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
+from clfractal.schema.fields import SCALE, Usual
 
 MAX_RESOLUTION = 16_384
 Side = Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION)]
@@ -28,7 +29,9 @@ class Box(Section):
     """A box in space, its sides along the axes."""
 
     center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    size: Size = Field(4.0, description="lengths of the sides, scene units; one number for a cube")
+    size: Annotated[Size, SCALE] = Field(
+        4.0, description="lengths of the sides, scene units; one number for a cube"
+    )
 
     @property
     def sides(self) -> Vector:
@@ -40,7 +43,7 @@ class Zoom(Section):
     """A smaller box within the one before."""
 
     center: Position = Field(description="middle of the smaller box, scene units")
-    scale: Annotated[float, Field(strict=True, ge=1, le=1e15, allow_inf_nan=False)] = Field(
+    scale: Annotated[float, Field(strict=True, ge=1, le=1e15, allow_inf_nan=False), SCALE] = Field(
         description="length of the sides of the box before, divided by this box's"
     )
 
@@ -135,7 +138,9 @@ class VolumeRenderer(Sampled):
     zoom: Annotated[tuple[Zoom, ...], Field(strict=False, max_length=64)] = Field(
         (), description="smaller boxes, each within the one before; the last is shown as large as the first"
     )
-    resolution: Resolution = Field(512, description="voxels along the longest side, or along x, y and z")
+    resolution: Annotated[Resolution, Usual(32, 2048)] = Field(
+        512, description="voxels along the longest side, or along x, y and z"
+    )
     file: str | None = Field(
         None,
         min_length=1,
@@ -160,13 +165,13 @@ class VolumeRenderer(Sampled):
     interpolation: Literal["trilinear", "nearest"] = Field(
         "trilinear", description="how values between the middles of voxels are found"
     )
-    step: Annotated[float, Field(strict=True, ge=0.01, le=4)] = Field(
+    step: Annotated[float, Field(strict=True, ge=0.01, le=4), Usual(0.1, 2)] = Field(
         0.5, description="step along a ray, in sides of a voxel"
     )
     level: Annotated[float, Field(strict=True, ge=-1e12, le=1e12)] | None = Field(
         None, description="value at the surface; null: the middle of the range of values"
     )
-    opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1)] = Field(
+    opacity_limit: Annotated[float, Field(strict=True, gt=0, le=1), Usual(0.5, 1)] = Field(
         0.99, description="opacity at which a ray ends"
     )
     transfer: Transfer = Field(

@@ -22,6 +22,7 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 from clfractal.arguments import plain
 from clfractal.errors import SceneError, Where
+from clfractal.schema.fields import DIRECTION, PLACE
 from clfractal.schema.hex_color import AS_TEXT
 
 Vector: TypeAlias = tuple[float, float, float]
@@ -34,7 +35,8 @@ Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=False)]
 
 # Strict tuples would refuse the lists of YAML and JSON; their entries stay strict.
-Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False)]
+Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), PLACE]
+Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), DIRECTION]
 Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 

@@ -6,7 +6,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
 
 from pydantic import Field, model_validator
 
-from clfractal.schema.base import Angle, Length, Position, Vector, length, problem, turn
+from clfractal.schema.base import Angle, Direction, Length, Position, Vector, length, problem, turn
+from clfractal.schema.fields import SCALE
 from clfractal.schema.kinds import Element, members
 from clfractal.schema.names import MaterialName
 
@@ -45,7 +46,7 @@ class Joined(ObjectBase):
         description="with the set and the formulas above it in the file: beside them; flowing together; taken out of"
         " them; or only what both have in common is left",
     )
-    smoothness: Length = Field(
+    smoothness: Annotated[Length, SCALE] = Field(
         0.2, description="of a smooth union: how far apart surfaces begin to flow together, scene units"
     )
 
@@ -73,7 +74,7 @@ class Simple(Joined):
 class Level(ObjectBase):
     """A surface without an end, seen from both sides."""
 
-    normal: Position = Field((0.0, 0.0, 1.0), description="direction that it faces")
+    normal: Direction = Field((0.0, 0.0, 1.0), description="direction that it faces")
 
     @model_validator(mode="after")
     def _faces_somewhere(self) -> Self:
@@ -88,7 +89,9 @@ class Solid(Simple):
     rotation: Angles = Field(
         (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
     )
-    scale: Sides = Field((1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated")
+    scale: Annotated[Sides, SCALE] = Field(
+        (1.0, 1.0, 1.0), description="factors along its own axes, before it is rotated"
+    )
 
     @classmethod
     @abstractmethod

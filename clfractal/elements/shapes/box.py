@@ -1,11 +1,12 @@
 """A box as an object."""
 
 import math
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Vector
+from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Sides, Solid
 
 
@@ -16,7 +17,7 @@ class BoxObject(Solid):
     title = "Box"
     place = 40
     type: Literal["box"] = "box"
-    size: Sides = Field((1.0, 1.0, 1.0), description="its sides, scene units")
+    size: Annotated[Sides, SCALE] = Field((1.0, 1.0, 1.0), description="its sides, scene units")
 
     @classmethod
     def first(cls, radius: float) -> dict[str, Any]:

@@ -1,10 +1,11 @@
 """A cylinder as an object."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Length, Vector
+from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
 
 
@@ -15,8 +16,8 @@ class CylinderObject(Solid):
     title = "Cylinder"
     place = 50
     type: Literal["cylinder"] = "cylinder"
-    radius: Length = Field(0.25, description="scene units")
-    height: Length = Field(1.0, description="from lid to lid, scene units")
+    radius: Annotated[Length, SCALE] = Field(0.25, description="scene units")
+    height: Annotated[Length, SCALE] = Field(1.0, description="from lid to lid, scene units")
 
     @classmethod
     def first(cls, radius: float) -> dict[str, Any]:

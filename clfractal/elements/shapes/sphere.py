@@ -1,10 +1,11 @@
 """A ball as an object."""
 
-from typing import Any, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Length, Vector, length
+from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
 
 
@@ -15,7 +16,7 @@ class SphereObject(Solid):
     title = "Sphere"
     place = 30
     type: Literal["sphere"] = "sphere"
-    radius: Length = Field(0.5, description="scene units")
+    radius: Annotated[Length, SCALE] = Field(0.5, description="scene units")
 
     @classmethod
     def first(cls, radius: float) -> dict[str, Any]:

@@ -14,6 +14,7 @@ from pydantic_core import PydanticUndefined
 from clfractal.scene.maps import Map
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
+from clfractal.schema.fields import Usual, known
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
 
@@ -54,73 +55,6 @@ class Meta:
     alternative: str = ""
 
 
-# Where values usually lie, for those whose bounds are too wide for a slider.
-_USUAL: dict[str, tuple[float, float]] = {
-    "Material.ambient": (0, 1),
-    "Material.diffuse": (0, 1),
-    "Material.specular": (0, 1),
-    "Material.shininess": (1, 1000),
-    **{
-        f"{kind}Light.temperature": (1500, 12_000)
-        for kind in ("Directional", "Point", "Spot", "Sphere", "Rectangle", "Set")
-    },
-    **{f"{kind}Light.intensity": (0, 4) for kind in ("Spot", "Sphere", "Rectangle")},
-    "DirectionalLight.intensity": (0, 4),
-    "PointLight.intensity": (0, 4),
-    "DirectionalLight.angular_size": (0, 45),
-    "PointLight.angular_size": (0, 45),
-    "DirectionalLight.rays": (1, 64),
-    "PointLight.rays": (1, 64),
-    "PathLighting.bounces": (0, 16),
-    "PathLighting.roulette": (0, 16),
-    "PathLighting.detail": (0.01, 1),
-    "PathLighting.clamp": (0.5, 100),
-    "Specular.ior": (1, 3),
-    "Coat.ior": (1, 3),
-    "Emission.luminance": (0, 4),
-    "Bump.height": (-0.1, 0.1),
-    "Bump.width": (0.001, 1),
-    "Map.layer": (1, 64),
-    "Map.scale": (0.01, 10),
-    "Waves.spread": (0, 90),
-    "Environment.intensity": (0, 4),
-    "Environment.rotation": (-180, 180),
-    "Environment.rays": (0, 64),
-    "Fog.density": (0.001, 10),
-    "PerspectiveCamera.fov": (5, 120),
-    "PerspectiveCamera.f_number": (0.5, 64),
-    "SurfaceRenderer.detail": (0.1, 10),
-    "SurfaceRenderer.max_steps": (50, 20000),
-    "SurfaceRenderer.step_scale": (0.05, 1),
-    "SurfaceRenderer.over_relaxation": (1, 1.99),
-    "SurfaceRenderer.firefly_limit": (0.5, 100),
-    "AmbientOcclusion.rays": (1, 64),
-    "Sampled.samples": (1, 1024),
-    "Sampled.noise": (0.001, 0.1),
-    "Sampled.min_samples": (4, 256),
-    "Sampled.filter_width": (0.5, 6),
-    "VolumeRenderer.resolution": (32, 2048),
-    "VolumeRenderer.step": (0.1, 2),
-    "VolumeRenderer.opacity_limit": (0.5, 1),
-    "FormulaSpec.iterations": (1, 1000),
-    "FormulaSpec.bailout": (1, 1000),
-    "FormulaSpec.distance_bailout": (1, 1e6),
-    "ChainLink.count": (1, 10),
-    "CutPlane.iterations": (1, 1000),
-    "CutPlaneRenderer.iterations": (1, 1000),
-    "CutPlane.count": (1, 32),
-    "Coloring.scale": (-2, 2),
-    "Coloring.offset": (-1, 1),
-    "Coloring.layer": (1, 64),
-    "EscapeColors.scale": (-4, 4),
-    "EscapeColors.offset": (-1, 1),
-    "Output.exposure": (-5, 5),
-    "Stereo.screen_width": (0.1, 10),
-    "Stereo.screen_distance": (0.2, 20),
-    "Stereo.interpupillary_distance": (0.02, 0.1),
-    "Stereo.separation": (0, 3),
-    "Stereo.budget": (0.1, 3),
-}
 # A range over more than this factor is divided by magnitudes.
 _DECADES = 40.0
 # Bounds farther apart than this are no range for a slider.
@@ -261,9 +195,9 @@ def _words(option: Any) -> tuple[Any, ...]:
 def _usual(
     section: type[Section], name: str, kind: Kind, low: float | None, high: float | None
 ) -> tuple[float, float] | None:
-    for each in section.__mro__:
-        if f"{each.__name__}.{name}" in _USUAL:
-            return _USUAL[f"{each.__name__}.{name}"]
+    usual = known(section, name, Usual)
+    if usual is not None:
+        return usual.low, usual.high
     if kind in ("number", "whole") and low is not None and high is not None and high - low <= _WIDEST:
         return low, high
     return None
