@@ -29,7 +29,6 @@ from clfractal.files.png import read_texts
 from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, own, parser, turns
 from clfractal.renderers import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
-from clfractal.schema.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.viewer import settings
 from clfractal.work import frames
 from tests.document import DOCS, PAGES, code, section, table, text
@@ -41,211 +40,19 @@ PACKAGE = Path(clfractal.__file__).resolve().parent
 
 # --- scenes ---
 
-# Heading in scenes.md -> class of the schema.
-SECTIONS = {
-    "formula": "FormulaSpec",
-    "formula.chain": "ChainLink",
-    "image": "Image",
-    "camera, perspective": "PerspectiveCamera",
-    "camera, orthographic": "OrthographicCamera",
-    "camera.orbit": "Orbit",
-    "camera.shift": "Shift",
-    "renderer, surface": "SurfaceRenderer",
-    "renderer.points": "Points",
-    "renderer.ambient_occlusion": "AmbientOcclusion",
-    "renderer.bounds": "Ball",
-    "lights, directional": "DirectionalLight",
-    "lights, point": "PointLight",
-    "lights, spot": "SpotLight",
-    "lights, sphere": "SphereLight",
-    "lights, set": "SetLight",
-    "lights, rectangle": "RectangleLight",
-    "material": "Material",
-    "coloring": "Coloring",
-    "coloring.palette": "Stop",
-    "coloring.trap": "Trap",
-    "background": "Gradient",
-    "environment": "Environment",
-    "environment.sky": "Sky",
-    "fog": "Fog",
-    "fog.scattering": "Scattering",
-    "glow": "Glow",
-    "layout": "Layout",
-    "layout.views": "LayoutView",
-    "stereo": "Stereo",
-    "stereo.plane": "StereoPlane",
-    "output": "Output",
-}
-
-# The same of the pages of other renderers.
-CUT_PLANES = {
-    "renderer, cut_plane": "CutPlaneRenderer",
-    "renderer.colors": "EscapeColors",
-    "renderer.plane": "Plane",
-    "renderer.plane.transform": "Transform",
-    "cut_planes": "CutPlane",
-}
-VOLUMES = {
-    "renderer, volume": "VolumeRenderer",
-    "renderer.box": "Box",
-    "renderer.zoom": "Zoom",
-    "renderer.transfer": "Transfer",
-    "renderer.transfer.opacity": "OpacityStop",
-    "renderer.transfer.color": "ColorStop",
-    "renderer.transfer.emission": "EmissionStop",
-}
-PATHS = {
-    "lighting, direct": "DirectLighting",
-    "lighting, path": "PathLighting",
-    "materials": "PbrMaterial",
-    "base": "Base",
-    "specular": "Specular",
-    "coat": "Coat",
-    "fuzz": "Fuzz",
-    "transmission": "Transmission",
-    "subsurface": "Subsurface",
-    "emission": "Emission",
-    "bump": "Bump",
-    "A number": "NumberMap",
-    "A colour": "ColorMap",
-}
-OBJECTS = {
-    "plane": "PlaneObject",
-    "water": "WaterObject",
-    "waves": "Waves",
-    "sphere": "SphereObject",
-    "box": "BoxObject",
-    "cylinder": "CylinderObject",
-    "formula": "FormulaObject",
-    "volume": "VolumeObject",
-}
-ANIMATION = {
-    "animation": "Animation",
-    "animation.tracks": "Track",
-    "animation.tracks.keys": "Key",
-}
-
-
-def number(value: float) -> str:
-    """As the pages write numbers: whole ones in full, in groups of three digits."""
-    return f"{value:,.0f}" if value == int(value) else f"{value:g}"
-
-
-def allowed(entry: dict[str, Any]) -> str:
-    """The values that a schema allows, in the words of scenes.md."""
-    options = [option for option in entry.get("anyOf", entry.get("oneOf", ())) if option != {"type": "null"}]
-    if options:
-        return " or ".join(allowed(option) for option in options)
-    if "const" in entry:
-        return f"`{entry['const']}`"
-    if "enum" in entry:
-        return ", ".join(f"`{word}`" for word in entry["enum"])
-    if "$ref" in entry:
-        return "a mapping"
-    kind = entry.get("type")
-    if kind == "array":
-        if entry.get("prefixItems", [{}])[0].get("type") == "array":
-            component = entry["prefixItems"][0]["prefixItems"][0]
-            kind = "positions" if component["minimum"] < 0 else f"colours, {interval(component)}"
-            return f"{len(entry['prefixItems'])} {kind}"
-        if "prefixItems" in entry:
-            return f"{len(entry['prefixItems'])} numbers, {interval(entry['prefixItems'][0])}"
-        return f"a list of {entry.get('minItems', 0)} to {entry['maxItems']}"
-    if kind in ("integer", "number"):
-        return ("whole, " if kind == "integer" else "") + interval(entry)
-    return {"boolean": "`true`, `false`", "string": "text", "object": "a mapping"}[str(kind)]
-
-
-def interval(entry: dict[str, Any]) -> str:
-    low, above = entry.get("minimum"), entry.get("exclusiveMinimum")
-    high, below = entry.get("maximum"), entry.get("exclusiveMaximum")
-    start = number(low) if low is not None else f"above {number(above or 0)}"
-    return f"{start} to {number(high)}" if high is not None else f"{start} to below {number(below or 0)}"
-
-
-def default(entry: dict[str, Any], name: str, required: list[str]) -> str:
-    if name in required:
-        return "required"
-    if "default" not in entry:
-        return "`{}`"  # made by a function: `output.precision` and mappings whose keys all have a default
-    shown = json.dumps(plain(entry["default"])).replace('"', "")
-    return f"`{shown}`"
-
-
-def plain(value: Any) -> Any:
-    """Whole floats as int, as one writes them."""
-    if isinstance(value, list):
-        return [plain(each) for each in value]
-    return int(value) if isinstance(value, float) and value.is_integer() else value
-
-
-def without_texts(entry: Any) -> Any:
-    """A schema without colours as text, which the page tells once, under its conventions."""
-    if isinstance(entry, list):
-        return [without_texts(each) for each in entry]
-    if not isinstance(entry, dict):
-        return entry
-    shorter = {key: without_texts(value) for key, value in entry.items() if key != "anyOf"}
-    others = [each for each in entry.get("anyOf", ()) if each not in (TEXT_SCHEMA, COLOR_SCHEMA)]
-    if len(others) == 1:
-        return {**without_texts(others[0]), **shorter}
-    return {**shorter, "anyOf": without_texts(others)} if others else shorter
-
-
-def expected_rows(name: str) -> list[list[str]]:
-    """key, default, allowed of a class of the schema."""
-    found = without_texts(load.schema()["$defs"][name])
-    required = found.get("required", [])
-    return [
-        [f"`{key}`", default(entry, key, required), allowed(entry)]
-        for key, entry in found["properties"].items()
-    ]
-
 
 def test_every_part_of_a_scene_is_described() -> None:
-    pages = (SECTIONS, CUT_PLANES, VOLUMES, ANIMATION, PATHS, OBJECTS)
-    told = {name for page in pages for name in page.values()}
-    assert told == set(load.schema()["$defs"])
+    told = [name for page in PAGES for name in maker("make_reference").sections_of(text(page))]
+    assert sorted(told) == sorted(load.schema()["$defs"])
     keys = {code(row[0]) for row in table("scenes.md", "The top level")}
     assert keys == set(load.schema()["properties"])
     required = {code(row[0]) for row in table("scenes.md", "The top level") if row[1] == "required"}
     assert required == set(load.schema()["required"])
 
 
-@pytest.mark.parametrize("heading", SECTIONS)
-def test_keys_defaults_and_ranges_of_a_scene(heading: str) -> None:
-    told = [row[:3] for row in table("scenes.md", heading)]
-    assert sorted(told) == sorted(expected_rows(SECTIONS[heading]))
-
-
-@pytest.mark.parametrize("heading", CUT_PLANES)
-def test_keys_defaults_and_ranges_of_cut_planes(heading: str) -> None:
-    told = [row[:3] for row in table("cut_planes.md", heading)]
-    assert sorted(told) == sorted(expected_rows(CUT_PLANES[heading]))
-
-
-@pytest.mark.parametrize("heading", VOLUMES)
-def test_keys_defaults_and_ranges_of_volumes(heading: str) -> None:
-    told = [row[:3] for row in table("volumes.md", heading)]
-    assert sorted(told) == sorted(expected_rows(VOLUMES[heading]))
-
-
-@pytest.mark.parametrize("heading", PATHS)
-def test_keys_defaults_and_ranges_of_paths(heading: str) -> None:
-    told = [row[:3] for row in table("paths.md", heading)]
-    assert sorted(told) == sorted(expected_rows(PATHS[heading]))
-
-
-@pytest.mark.parametrize("heading", OBJECTS)
-def test_keys_defaults_and_ranges_of_objects(heading: str) -> None:
-    told = [row[:3] for row in table("objects.md", heading)]
-    assert sorted(told) == sorted(expected_rows(OBJECTS[heading]))
-
-
-@pytest.mark.parametrize("heading", ANIMATION)
-def test_keys_defaults_and_ranges_of_animations(heading: str) -> None:
-    told = [row[:3] for row in table("animation.md", heading)]
-    assert sorted(told) == sorted(expected_rows(ANIMATION[heading]))
+@pytest.mark.parametrize("page", PAGES)
+def test_keys_defaults_and_ranges_are_those_of_the_schema(page: str) -> None:
+    assert maker("make_reference").made(text(page)) == text(page), "run docs/make_reference.py"
 
 
 def test_limits_of_scene_files() -> None:

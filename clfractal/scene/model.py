@@ -87,9 +87,7 @@ class Scene(Section):
     environment: Environment | None = None
     fog: Fog | None = None
     glow: Glow | None = None
-    objects: Objects = Field(
-        {}, description="planes, water, spheres, boxes, cylinders, formulas and volumes by name"
-    )
+    objects: Objects = Field({}, description="shapes, water, formulas and volumes by name")
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"
     )

@@ -14,7 +14,7 @@ from clfractal.errors import ClfractalError
 from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.movement import movement_of
-from clfractal.scene.objects import MAX_FORMULAS, MAX_OBJECTS, FormulaObject
+from clfractal.scene.objects import KINDS, MAX_FORMULAS, MAX_OBJECTS, FormulaObject
 from tests.render.objects_oracle import rotation_of
 from tests.scenes import HEAD
 
@@ -29,7 +29,7 @@ CASES = [
     ("objects: {ball: {radius: §0}}", "objects.ball.radius: must be above 0, got 0"),
     (
         "objects: {ball: {type: §bal}}",
-        "objects.ball.type: unknown type 'bal'; known: box, cylinder, formula, plane, sphere, volume, water",
+        "objects.ball.type: unknown type 'bal'; known: " + ", ".join(sorted(kind.tag for kind in KINDS)),
     ),
     (
         "objects: {ball: {§size: 3}}",

@@ -13,6 +13,7 @@ pytest.importorskip("imgui_bundle")
 from clfractal.optics.view import scene_view
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.schema.shape import solids
 from clfractal.viewer.editing import edited
 from clfractal.viewer.panels import first, lights
 from clfractal.viewer.panels import objects as objects_panel
@@ -41,7 +42,7 @@ BESIDE = ("objects.ball={type: sphere, position: [1.6, 0, 0], radius: 0.3}",)
 VIEWS = pytest.mark.parametrize(
     "view", [(), NEAR, BELOW, FLAT, ASIDE], ids=["", "near", "below", "flat", "aside"]
 )
-SOLIDS = ("sphere", "box", "cylinder", "formula")
+SOLIDS = (*(kind.tag for kind in solids()), "formula")
 
 
 @pytest.fixture(scope="module")
