@@ -15,10 +15,10 @@ from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer import marks, window
 from clfractal.viewer.begin import Begun
-from clfractal.viewer.deeds import Deeds
 from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.inputs import Inputs
 from clfractal.viewer.measuring import Measuring
+from clfractal.viewer.operators import Operators
 from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.panels import all_panels, timeline_area
 from clfractal.viewer.panels.ui import Ui
@@ -58,9 +58,9 @@ class Viewer(Workspace):
         self.own_screen = OwnScreen(self.studio)
         self.depth_range, self.room = DepthRange(), Room()
         self.pads = window.Pads()
-        self.deeds = Deeds(self)
-        self.deeds.scene.first_stereo = self.screen
-        self.inputs = Inputs(self, self.deeds, begun.recording)
+        self.operators = Operators(self)
+        self.operators.scene.first_stereo = self.screen
+        self.inputs = Inputs(self, self.operators, begun.recording)
         self._hidden, self._measuring = False, Measuring(begun.options)
         self._told: Any = None
         self._failed: set[str] = set()
@@ -139,8 +139,8 @@ class Viewer(Workspace):
             self.files.leave()
 
     def act(self, name: str) -> None:
-        """Does an action; see `Deeds`."""
-        self.deeds.do(name)
+        """Does an action; see `Operators`."""
+        self.operators.do(name)
         self._redraw = _REDRAWN
 
     def redraw(self) -> None:
@@ -231,7 +231,7 @@ class Viewer(Workspace):
             self.places = places
             self._build_panels(now)
         self.outputs.draw(
-            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
+            self.surface, self.operators.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
         )
         self._redraw_while_busy()
         still = self.inputs.played and not self.motion.active
@@ -245,7 +245,7 @@ class Viewer(Workspace):
         self.outputs.draw(self.surface, False, lambda by: None)
         pixels = self.outputs.read(picture=True)
         self.outputs.draw(
-            self.surface, self.deeds.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
+            self.surface, self.operators.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
         )
         return pixels
 

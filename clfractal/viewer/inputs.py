@@ -9,9 +9,9 @@ from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError
 from clfractal.viewer import window
-from clfractal.viewer.deeds import HELD, Deeds
 from clfractal.viewer.flying import Key
 from clfractal.viewer.keys import KEYS, PRINTABLE, Context, KeyEvent
+from clfractal.viewer.operators import HELD, Operators
 from clfractal.viewer.panels import keyboard
 from clfractal.viewer.recording import Event, Player, Recorder, Recording
 from clfractal.viewer.workspace import Workspace
@@ -44,8 +44,8 @@ class Inputs:
         recording: events to play; None: none.
     """
 
-    def __init__(self, workspace: Workspace, deeds: Deeds, recording: Recording | None) -> None:
-        self.workspace, self.deeds = workspace, deeds
+    def __init__(self, workspace: Workspace, operators: Operators, recording: Recording | None) -> None:
+        self.workspace, self.operators = workspace, operators
         self._before: tuple[float, float] | None = None
         self._held: dict[int, Key] = {}
         self._player: Player | None = None
@@ -106,7 +106,7 @@ class Inputs:
             x * framebuffer[0] / max(size[0], 1),
             y * framebuffer[1] / max(size[1], 1),
         )
-        if self.deeds.flying:
+        if self.operators.flying:
             if self._before is not None:
                 dx, dy = x - self._before[0], y - self._before[1]
                 work.motion.turn(_LOOK * dx * work.settings.mouse, _LOOK * dy * work.settings.mouse)
@@ -128,10 +128,10 @@ class Inputs:
         if action == RELEASE and work.controls.dragging:
             work.controls.release(self._in_picture())
         # Panels see every release, and what was not pressed in the picture.
-        over_panels = io.want_capture_mouse and not self.deeds.flying
+        over_panels = io.want_capture_mouse and not self.operators.flying
         if 0 <= button < 5:
             io.add_mouse_button_event(button, action == PRESS)
-        if action == PRESS and not over_panels and not self.deeds.flying:
+        if action == PRESS and not over_panels and not self.operators.flying:
             imgui.set_window_focus(None)
             keyboard.leave(work.ui)
             aim = work.aim_at(*self.workspace.pointer)
@@ -139,7 +139,7 @@ class Inputs:
 
     def _scroll(self, now: float, dx: float, dy: float) -> None:
         work, io = self.workspace, imgui.get_io()
-        if self.deeds.flying:
+        if self.operators.flying:
             work.motion.fly.faster(dy)
             return
         if io.want_capture_mouse:
@@ -159,7 +159,7 @@ class Inputs:
                 work.motion.keys.discard(held)
             return
         typing = io.want_text_input or keyboard.inside(work.ui)
-        context: Context = "text" if typing else "fly" if self.deeds.flying else "picture"
+        context: Context = "text" if typing else "fly" if self.operators.flying else "picture"
         work.ui.keys.layout = layout = window.layout(PRINTABLE)
         event = KeyEvent(key, scancode, mods, name, frozenset(map(str.lower, layout.values())))
         found = work.ui.keys.matches(event, context)

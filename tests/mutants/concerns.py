@@ -97,7 +97,7 @@ clfractal/viewer/begin.py: window/
 clfractal/viewer/inputs.py: window/
 clfractal/viewer/ui_renderer.py: window/
 clfractal/viewer/outputs.py: window/
-clfractal/viewer/deeds.py: window/
+clfractal/viewer/operators.py: window/
 clfractal/viewer/motion.py: window/
 clfractal/viewer/*: viewer/studio viewer/session viewer/controls
 clfractal/*: cli api

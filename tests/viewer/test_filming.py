@@ -17,7 +17,7 @@ from clfractal.viewer.controls import Controls
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.navigation import dolly
 from clfractal.viewer.saving import save_scene
-from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
+from clfractal.viewer.scene_operators import STEREO_MODES, SceneOperators
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.sources import open_source
 from clfractal.viewer.standard_views import to_orthographic
@@ -298,10 +298,10 @@ def test_the_ways_of_stereo_go_round_past_off() -> None:
     studio = studio_of(LIT, 0)
     motion = Motion(studio)
     controls = Controls(studio, Settings(), motion)
-    deeds = SceneDeeds(studio, controls, motion, lambda: None, lambda: 0.0)
+    operators = SceneOperators(studio, controls, motion, lambda: None, lambda: 0.0)
     modes = set()
     for _ in STEREO_MODES:
-        deeds.stereo_mode(1)
+        operators.stereo_mode(1)
         assert studio.scene.stereo is not None
         modes.add(studio.scene.stereo.mode)
     assert len(modes) >= len(STEREO_MODES) - 3

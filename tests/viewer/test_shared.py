@@ -15,7 +15,7 @@ from clfractal.viewer.controls import Controls
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.plane_moves import shift
 from clfractal.viewer.saving import SceneSource, scene_text
-from clfractal.viewer.scene_deeds import SceneDeeds
+from clfractal.viewer.scene_operators import SceneOperators
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.shared import groups_of
 from clfractal.viewer.studio import Studio
@@ -68,10 +68,10 @@ class Desk:
         assert load_scene(found) == self.studio.document
         return found
 
-    def keys(self, aim: Callable[[], Aim | None]) -> SceneDeeds:
+    def keys(self, aim: Callable[[], Aim | None]) -> SceneOperators:
         motion = Motion(self.studio)
         controls = Controls(self.studio, Settings(), motion)
-        return SceneDeeds(self.studio, controls, motion, aim, lambda: 0.0)
+        return SceneOperators(self.studio, controls, motion, aim, lambda: 0.0)
 
 
 @pytest.fixture
@@ -99,7 +99,7 @@ def test_the_plane_in_the_object_is_the_one_that_is_cut(figure: Desk, key: str, 
         renderer = figure.studio.scene.layout.views[1].renderer  # type: ignore[union-attr]
         return SimpleNamespace(plane_path=CUT, plane=renderer.plane) if half == CUT else None  # type: ignore[union-attr]
 
-    figure.keys(aim).deeds[key]()
+    figure.keys(aim).operators[key]()
     after = figure.same(IN_OBJECT, CUT)
     assert after != before
     text = figure.text

@@ -15,12 +15,12 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.aim import Aim, aimed
 from clfractal.viewer.controls import Controls
-from clfractal.viewer.deeds import HELD, Deeds
 from clfractal.viewer.motion import TRANSITION_SECONDS, Motion
+from clfractal.viewer.operators import HELD, Operators
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.playing import Player
-from clfractal.viewer.scene_deeds import STEREO_MODES, SceneDeeds
+from clfractal.viewer.scene_operators import STEREO_MODES, SceneOperators
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
 from clfractal.work.prepare import prepare
@@ -44,7 +44,7 @@ class Desk:
         self.controls = Controls(self.studio, Settings(), self.motion)
         self.now = 0.0
         self.hit: float = 2.0
-        self.deeds = SceneDeeds(self.studio, self.controls, self.motion, self.aim, lambda: self.now)
+        self.operators = SceneOperators(self.studio, self.controls, self.motion, self.aim, lambda: self.now)
 
     def aim(self) -> Aim:
         """What is in the middle of the picture: at a depth of `hit`."""
@@ -58,7 +58,7 @@ class Desk:
 
     def do(self, name: str) -> None:
         """Does an action, and waits until the camera has stopped."""
-        self.deeds.deeds[name]()
+        self.operators.operators[name]()
         self.now += 2 * TRANSITION_SECONDS
         while self.motion.step(self.now, 0.02):
             pass
@@ -101,10 +101,10 @@ def test_every_action_is_done_by_something(desk: Desk) -> None:
         window=Anything(),
         ui=SimpleNamespace(show=set()),
     )
-    deeds = Deeds(cast(Any, viewer))
+    operators = Operators(cast(Any, viewer))
     # (One is a button of a panel alone.)
-    assert deeds.names - set(ACTIONS) <= {"focus_pick"}
-    assert set(ACTIONS) <= deeds.names
+    assert operators.names - set(ACTIONS) <= {"focus_pick"}
+    assert set(ACTIONS) <= operators.names
     assert {action.name for action in ACTIONS.values() if action.held} == set(HELD)
 
 
@@ -114,7 +114,7 @@ def test_no_action_fails_and_scenes_stay_valid(desk: Desk) -> None:
     from clfractal.scene.load import load_scene
 
     for _ in range(2):
-        for name in sorted(desk.deeds.deeds):
+        for name in sorted(desk.operators.operators):
             desk.do(name)
             assert load_scene(desk.studio.scene.resolved()) == desk.studio.scene, name
 
@@ -430,7 +430,7 @@ def test_keys_add_up_while_the_camera_moves(desk: Desk) -> None:
     other = Desk(desk.device)
     for _ in range(3):
         desk.do("orbit_right")
-        other.deeds.deeds["orbit_right"]()
+        other.operators.operators["orbit_right"]()
         other.motion.step(other.now + 0.1 * TRANSITION_SECONDS, 0.02)
     other.now = 5
     other.motion.step(other.now, 0.02)

@@ -13,7 +13,7 @@ from clfractal.errors import ClfractalError
 from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
 from clfractal.viewer.panels import all_panels, keyboard
-from clfractal.viewer.scene_deeds import SceneDeeds
+from clfractal.viewer.scene_operators import SceneOperators
 from clfractal.viewer.workspace import Workspace
 
 HELD: dict[str, Key] = {
@@ -42,7 +42,7 @@ _PARTS = {
 }
 
 
-class Deeds:
+class Operators:
     """The actions of a window, by their names.
 
     Attributes:
@@ -53,7 +53,7 @@ class Deeds:
 
     def __init__(self, workspace: Workspace) -> None:
         self.workspace = workspace
-        self.scene = SceneDeeds(
+        self.scene = SceneOperators(
             workspace.studio,
             workspace.controls,
             workspace.motion,
@@ -63,8 +63,8 @@ class Deeds:
         self.chart_shown = False
         self.flying = False
         files = workspace.files
-        self._deeds: dict[str, Callable[[], None]] = {
-            **self.scene.deeds,
+        self._operators: dict[str, Callable[[], None]] = {
+            **self.scene.operators,
             **self._film(),
             **{name: self._switch(part) for name, part in _PARTS.items()},
             "into_panels": lambda: keyboard.enter(workspace.ui),
@@ -104,8 +104,8 @@ class Deeds:
                 self.workspace.use_device(choose(rest))
             elif colon and kind == "open":
                 self.workspace.files.open(Path(rest))
-            elif name in self._deeds:
-                self._deeds[name]()
+            elif name in self._operators:
+                self._operators[name]()
         except ClfractalError as error:
             studio.tell(str(error), wrong=True)
         finally:
@@ -114,7 +114,7 @@ class Deeds:
     @property
     def names(self) -> set[str]:
         """All actions that can be done."""
-        return set(self._deeds) | set(HELD)
+        return set(self._operators) | set(HELD)
 
     def _film(self) -> dict[str, Callable[[], None]]:
         work, player = self.workspace, self.workspace.player

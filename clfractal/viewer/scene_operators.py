@@ -40,7 +40,7 @@ _MOVE = 0.04  # of a plane's height
 _RENDERERS = ("surface", "volume", "cut_plane")
 
 
-class SceneDeeds:
+class SceneOperators:
     """The actions that change the scene, by their names.
 
     Args:
@@ -65,7 +65,7 @@ class SceneDeeds:
         self._perspective: PerspectiveCamera | None = None
         self._kept: dict[str, Any] | None = None
         self._pivot: Vector | None = None
-        self.deeds: dict[str, Callable[[], None]] = {
+        self.operators: dict[str, Callable[[], None]] = {
             **self._cameras(),
             **self._planes(),
             **self._stereo(),
