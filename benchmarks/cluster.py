@@ -230,7 +230,7 @@ async def simulate(count: int, seconds: float, address: str) -> None:
         film = np.zeros((len(item.tiles), channels, TILE, TILE), np.float32)
         own, tally, took = get_worker(), Tally(rays=1), seconds * len(item.tiles)
         return real.Answer(
-            item.view, item.tiles, film, tally, took, own.address, str(own.name), real.maker_of(info)
+            item.view, item.tiles, film, tally, took, own.address, str(own.name), real.render_device_of(info)
         )
 
     for function in (enlist, tiles):

@@ -185,7 +185,7 @@ class Cluster:
                     self._count(answer)
                     # Programs are built side by side.
                     tally = replace(answer.tally, build_ms=answer.tally.build_ms / max(len(self._shares), 1))
-                    yield Result(answer.view, tiles, film, tally, answer.maker)
+                    yield Result(answer.view, tiles, film, tally, answer.render_device)
                 finally:
                     self._call(self._dispatcher.stored)
         finally:
@@ -228,7 +228,8 @@ class Cluster:
 
     def _count(self, answer: Answer) -> None:
         share = self._shares.setdefault(
-            (answer.worker, answer.maker.key), Share(answer.name, answer.worker, answer.maker.name)
+            (answer.worker, answer.render_device.key),
+            Share(answer.name, answer.worker, answer.render_device.name),
         )
         share.bundles += 1
         share.tiles += len(answer.tiles)

@@ -25,7 +25,7 @@ from clfractal.cluster.message import Arrays, Digests, Message, pack, unpack
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, DeviceInfo, choose, has_float64
 from clfractal.errors import ClfractalError, Stopped, Where
-from clfractal.pictures.makers import Maker
+from clfractal.pictures.provenance import RenderDevice
 from clfractal.work.job import Job
 from clfractal.work.prepare import pays_to_measure, with_lanes
 from clfractal.work.run import Floats, Tally, Tiles, WorkItem
@@ -97,7 +97,7 @@ class Answer:
         seconds: wall time of the worker, with what it had to build.
         worker: its address.
         name: what Dask calls it.
-        maker: the device.
+        render_device: the device.
     """
 
     view: int
@@ -107,12 +107,12 @@ class Answer:
     seconds: float
     worker: str
     name: str
-    maker: Maker
+    render_device: RenderDevice
 
 
-def maker_of(device: DeviceInfo) -> Maker:
+def render_device_of(device: DeviceInfo) -> RenderDevice:
     """How a picture calls a worker's device: without the index, which names another device on another machine."""
-    return Maker.of("", device.name, device.key)
+    return RenderDevice.of("", device.name, device.key)
 
 
 def enlist(wanted: str, device: str | None, share: tuple[int, int] | None) -> dict[str, Any]:
@@ -170,7 +170,7 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
             time.perf_counter() - start,
             get_worker().address,
             str(get_worker().name),
-            maker_of(engine.device.info),
+            render_device_of(engine.device.info),
         )
 
     return _answered(seat, work)

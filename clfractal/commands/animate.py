@@ -237,7 +237,9 @@ def _render_on(
             )
             counted.rendered(made.state.rays)
             counted.stats.add(number, job, made.state, wall_ms=made.wall_ms, write_ms=made.write_ms)
-            kinds |= {maker.key for maker in made.state.makers}  # a cluster's are known when they have come
+            kinds |= {
+                each.key for each in made.state.render_devices
+            }  # a cluster's are known when they have come
             if len(kinds) > 1 and not told:
                 told = True
                 shell.say(f"{order.scene}: {mixed_kinds(len(kinds))}")

@@ -49,7 +49,7 @@ _RECORD = struct.Struct("<II")
 _LARGEST_IDENTITY = 16 << 20  # bytes
 _NOTE = 0xFFFFFFFF
 _INDEX_BITS = 24
-_MOST_MAKERS = 250
+_MOST_DEVICES = 250
 
 
 class Journal:
@@ -67,7 +67,7 @@ class Journal:
         self._records = 0
         self._place = np.full(tile_count, -1, dtype=np.int64)  # record number of each tile
         self._done = np.zeros(tile_count, dtype=np.bool_)
-        self._makers = np.zeros(tile_count, dtype=np.uint8)
+        self._provenance = np.zeros(tile_count, dtype=np.uint8)
         self._notes: dict[int, dict[str, Any]] = {}
 
     @classmethod
@@ -161,33 +161,33 @@ class Journal:
         return self._done
 
     @property
-    def makers(self) -> npt.NDArray[np.uint8]:
-        """For each tile the number of who made it; not to be written to."""
-        return self._makers
+    def provenance(self) -> npt.NDArray[np.uint8]:
+        """For each tile the number of the device that made it; not to be written to."""
+        return self._provenance
 
     @property
     def notes(self) -> Mapping[int, dict[str, Any]]:
-        """What is noted of makers, by their numbers."""
+        """What is noted of devices, by their numbers."""
         return self._notes
 
-    def note(self, maker: int, about: Mapping[str, Any]) -> None:
-        """Notes who a maker of tiles is (JSON values, cut where a record has no room for them).
+    def note(self, device: int, about: Mapping[str, Any]) -> None:
+        """Notes which device made tiles (JSON values, cut where a record has no room for them).
 
         Raises:
             FileError: it cannot be written.
         """
-        if not 0 < maker <= _MOST_MAKERS:
-            raise ValueError(f"maker {maker}")
+        if not 0 < device <= _MOST_DEVICES:
+            raise ValueError(f"device {device}")
         shown = {key: str(value)[: self._payload // 16] for key, value in about.items()}
-        text = json.dumps({**shown, "number": maker}, ensure_ascii=False).encode()
+        text = json.dumps({**shown, "number": device}, ensure_ascii=False).encode()
         self._write(_NOTE, text[: self._payload].ljust(self._payload, b"\0"))
-        self._notes[maker] = shown
+        self._notes[device] = shown
 
-    def append(self, tile_index: int, array: Floats, maker: int = 0) -> None:
+    def append(self, tile_index: int, array: Floats, device: int = 0) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns), at most `SIDE` rows and columns.
 
         Args:
-            maker: who made it, see `note`.
+            device: who made it, see `note`.
 
         Raises:
             FileError: it cannot be written (a full disk); what was there before is still whole.
@@ -200,9 +200,9 @@ class Journal:
         else:
             stored = np.zeros((planes, SIDE, SIDE), dtype="<f4")
             stored[:, :rows, :columns] = array
-        self._place[tile_index] = self._write(tile_index | maker << _INDEX_BITS, stored.tobytes())
+        self._place[tile_index] = self._write(tile_index | device << _INDEX_BITS, stored.tobytes())
         self._done[tile_index] = True
-        self._makers[tile_index] = maker
+        self._provenance[tile_index] = device
 
     def tile(self, tile_index: int) -> Floats:
         """A stored tile: float32 of shape (channels, `SIDE`, `SIDE`).
@@ -269,11 +269,11 @@ class Journal:
             if found[0] == _NOTE:
                 self._read_note(found[1].tobytes())
                 continue
-            maker, index = divmod(found[0], 1 << _INDEX_BITS)
+            device, index = divmod(found[0], 1 << _INDEX_BITS)
             if index < len(self._place):
                 self._place[index] = number
                 self._done[index] = True
-                self._makers[index] = maker
+                self._provenance[index] = device
 
     def _read_note(self, payload: bytes) -> None:
         with suppress(ValueError, KeyError, TypeError):

@@ -14,7 +14,7 @@ from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.curves import Tone
 from clfractal.pictures.develop import Development, developed, rgb8
-from clfractal.pictures.makers import Maker, Makers
+from clfractal.pictures.provenance import Provenance, RenderDevice
 from clfractal.pictures.tiled import Bands, Floats, Picture, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -96,7 +96,7 @@ class Film:
         for name, plane in self._planes.items():
             plane.fill(CHANNELS[name].fill)
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
-        self.makers = Makers(self.grid.count)
+        self.provenance = Provenance(self.grid.count)
         """Which devices made the tiles, if several did."""
 
     @property
@@ -190,10 +190,12 @@ class Film:
         self._data[:, top : top + tile.height, left : left + tile.width] = array
         self._done[tile_index] = True
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
+    def put_tiles(
+        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+    ) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
-        if maker is not None:
-            self.makers.put(indices, maker)
+        if render_device is not None:
+            self.provenance.put(indices, render_device)
         region, data = self.region, self._data
         boxes = self.grid.boxes(indices).tolist()
         for (x, y, width, height), array in zip(boxes, film, strict=True):
@@ -213,7 +215,12 @@ class Film:
         film = Film(tuple(planes), self.display, self.region, lambda: self.header)
         film.fill(planes)
         film._done[:] = self.done
-        film.makers, film.prober, film.inputs, film.stage = self.makers, self.prober, self.inputs, self.stage
+        film.provenance, film.prober, film.inputs, film.stage = (
+            self.provenance,
+            self.prober,
+            self.inputs,
+            self.stage,
+        )
         return film
 
     def take(self, other: Film) -> None:
@@ -221,7 +228,7 @@ class Film:
         for name in self.channels:
             self._planes[name][:] = other[name]
         self._done[:] = other.done
-        self.makers = other.makers
+        self.provenance = other.provenance
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows)."""

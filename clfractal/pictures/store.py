@@ -12,7 +12,7 @@ import numpy.typing as npt
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
 from clfractal.pictures.film import Film, in_memory
-from clfractal.pictures.makers import Maker, Makers
+from clfractal.pictures.provenance import Provenance, RenderDevice
 from clfractal.pictures.tiled import Bands, Floats, check_tile
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 
@@ -61,7 +61,7 @@ class JournalFilm:
             self.journal = Journal.resume(path, whole, self.channels, tiles, others)
         else:
             self.journal = Journal.create(path, whole, self.channels, tiles)
-        self.makers = self._noted_makers()
+        self.provenance = self._noted_provenance()
 
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""
@@ -72,29 +72,31 @@ class JournalFilm:
         """For each tile, whether it is finished."""
         return self.journal.done
 
-    def put(self, tile_index: int, array: Floats, maker: Maker | None = None) -> None:
+    def put(self, tile_index: int, array: Floats, render_device: RenderDevice | None = None) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns).
 
         Args:
-            maker: the device that made it, where several render the picture.
+            render_device: the device that made it, where several render the picture.
 
         Raises:
             FileError: the journal cannot be written (a full disk).
         """
         check_tile(array, self.grid.tile(tile_index), self.channels)
         number = 0
-        if maker is not None:
-            number = self.makers.number(maker)
+        if render_device is not None:
+            number = self.provenance.number(render_device)
             if number not in self.journal.notes:
-                self.journal.note(number, maker.as_data())
+                self.journal.note(number, render_device.as_data())
         self.journal.append(tile_index, array, number)
-        self.makers.of_tiles[tile_index] = number
+        self.provenance.of_tiles[tile_index] = number
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
+    def put_tiles(
+        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+    ) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
 
         Args:
-            maker: as for `put`.
+            render_device: as for `put`.
 
         Raises:
             FileError: the journal cannot be written (a full disk).
@@ -102,7 +104,7 @@ class JournalFilm:
         for index, array in zip(indices.tolist(), film, strict=True):
             tile = self.grid.tile(index)
             top, left = tile.y % TILE, tile.x % TILE
-            self.put(index, array[:, top : top + tile.height, left : left + tile.width], maker)
+            self.put(index, array[:, top : top + tile.height, left : left + tile.width], render_device)
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows).
@@ -124,14 +126,14 @@ class JournalFilm:
                     band[:, :, left : left + tile.width] = pixels
             yield first.y, dict(zip(self.channels, band, strict=True))
 
-    def _noted_makers(self) -> Makers:
+    def _noted_provenance(self) -> Provenance:
         """Those of an earlier run."""
-        found, notes = Makers(self.grid.count), self.journal.notes
-        last = max([0, *notes, int(self.journal.makers.max(initial=0))])
+        found, notes = Provenance(self.grid.count), self.journal.notes
+        last = max([0, *notes, int(self.journal.provenance.max(initial=0))])
         for number in range(1, last + 1):
             about = notes.get(number, {"index": f"device {number}"})
-            found.known.append(Maker(*(str(about.get(key, "")) for key in ("index", "name", "key"))))
-        found.of_tiles[:] = self.journal.makers
+            found.known.append(RenderDevice(*(str(about.get(key, "")) for key in ("index", "name", "key"))))
+        found.of_tiles[:] = self.journal.provenance
         return found
 
     def to_film(self) -> Film:

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.pictures.makers import Maker, Makers
+from clfractal.pictures.provenance import Provenance, RenderDevice
 from clfractal.pictures.tiles import Region, Tile, TileGrid
 
 Floats = npt.NDArray[np.float32]
@@ -54,14 +54,16 @@ class TiledStore(Picture, Protocol):
         """For each tile, whether it is finished; not to be written to."""
 
     @property
-    def makers(self) -> Makers:
+    def provenance(self) -> Provenance:
         """Which devices made the tiles, if several did."""
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
+    def put_tiles(
+        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+    ) -> None:
         """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
 
         Args:
-            maker: the device that made them, where several render the picture.
+            render_device: the device that made them, where several render the picture.
         """
 
     def tell(self, key: str, value: Any) -> None:

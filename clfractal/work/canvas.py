@@ -15,7 +15,7 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
-from clfractal.pictures.makers import Maker, Makers
+from clfractal.pictures.provenance import Provenance, RenderDevice
 from clfractal.pictures.tiled import Bands, Floats
 from clfractal.pictures.tiles import TILE, Region, TileGrid
 from clfractal.renderers.plan import PlannedView
@@ -199,14 +199,16 @@ class CanvasStore:
         self.grid = TileGrid(self.region)
         self.header: dict[str, Any] = {}
         self._done = np.zeros(self.grid.count, np.bool_)
-        self.makers = Makers(0)  # one device draws on a canvas
+        self.provenance = Provenance(0)  # one device draws on a canvas
 
     @property
     def done(self) -> npt.NDArray[np.bool_]:
         """For each tile, whether it is finished."""
         return self._done
 
-    def put_tiles(self, indices: npt.NDArray[np.int32], film: Floats, maker: Maker | None = None) -> None:
+    def put_tiles(
+        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+    ) -> None:
         """Counts finished tiles; `film` holds none of them."""
         self._done[indices] = True
 

@@ -39,10 +39,10 @@ class FilmStats:
         self._sum.add(state)
         self._sum.tiles += state.tiles
         self._sum.tiles_before += state.tiles_before
-        for maker, (tiles, tally) in state.makers.items():
-            before, total = self._sum.makers.get(maker, (0, Tally()))
+        for render_device, (tiles, tally) in state.render_devices.items():
+            before, total = self._sum.render_devices.get(render_device, (0, Tally()))
             total.add(tally)
-            self._sum.makers[maker] = (before + tiles, total)
+            self._sum.render_devices[render_device] = (before + tiles, total)
         self._write_ms += write_ms
         times = {
             "build_ms": state.build_ms,

@@ -19,8 +19,8 @@ from clfractal.optics.view import scene_view, seen_by
 from clfractal.pictures.compose import APART, Composed, Side
 from clfractal.pictures.denoise import NAME
 from clfractal.pictures.film import Film
-from clfractal.pictures.makers import lines_of
 from clfractal.pictures.paste import Pasted
+from clfractal.pictures.provenance import lines_of
 from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiled import Picture
 from clfractal.pictures.tiles import Region, TileGrid
@@ -289,7 +289,7 @@ class Job:
         seconds = sum(store.header.get("seconds", 0.0) for store in stores)
         # A composed picture has no camera, and its time is that of both pictures.
         common = {key: value for key, value in (header or {}).items() if not key.startswith("worldTo")}
-        added = None if alone else {**common, **_makers_of(stores), "seconds": seconds}
+        added = None if alone else {**common, **_provenance_of(stores), "seconds": seconds}
         return Composed(made.stereo, made.image, eyes.get("left"), eyes.get("right"), made.region, added)
 
     def eyes(self, stores: Sequence[Picture]) -> dict[Side, Picture]:
@@ -316,14 +316,14 @@ class Job:
             made.size,
             made.region,
             {name: fill.get(name, CHANNELS[name].fill) for name in self.channels},
-            {**(header or {}), **_makers_of([stores[number] for number in made.views])},
+            {**(header or {}), **_provenance_of([stores[number] for number in made.views])},
         )
 
 
-def _makers_of(stores: Sequence[Picture]) -> dict[str, str]:
+def _provenance_of(stores: Sequence[Picture]) -> dict[str, str]:
     """A header's entry for the devices that made the views of a picture, if several did."""
     tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
-    lines = lines_of(store.makers.counts(store.done) for store in tiled)
+    lines = lines_of(store.provenance.counts(store.done) for store in tiled)
     return {"devices": lines} if lines else {}
 
 

@@ -116,8 +116,8 @@ def _of_keys(scene: Scene) -> list[str]:
 def _of_kinds(stores: Sequence[Picture]) -> list[str]:
     """That devices of several kinds have made parts of a picture."""
     tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
-    makers = {maker.key: maker for store in tiled for maker in store.makers.counts(store.done)}
-    return [mixed_kinds(len(makers))] if len(makers) > 1 else []
+    render_devices = {each.key: each for store in tiled for each in store.provenance.counts(store.done)}
+    return [mixed_kinds(len(render_devices))] if len(render_devices) > 1 else []
 
 
 def mixed_kinds(count: int) -> str:

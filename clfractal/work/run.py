@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
-from clfractal.pictures.makers import Maker
+from clfractal.pictures.provenance import RenderDevice
 from clfractal.pictures.tiled import TiledStore
 from clfractal.work.job import Job
 
@@ -76,7 +76,7 @@ class Result:
         tiles: indices of the tiles.
         film: their channels, shape (tiles, channels, TILE, TILE).
         tally: see `Tally`.
-        maker: the device that made them, where several do a job.
+        render_device: the device that made them, where several do a job.
         remark: what the user should know about the work, or empty.
     """
 
@@ -84,7 +84,7 @@ class Result:
     tiles: Tiles
     film: Floats
     tally: Tally
-    maker: Maker | None = None
+    render_device: RenderDevice | None = None
     remark: str = ""
 
 
@@ -108,8 +108,8 @@ class Executor(Protocol):
 class Progress(Tally):
     """The progress of a job, its counts and times; `remaining` is None until it can be estimated.
 
-    `views` has the counts and times of each of the job's views, `makers` those of each device where several do the job,
-    with its tiles, and `remarks` what the user should know about the work.
+    `views` has the counts and times of each of the job's views, `render_devices` those of each device where several do the
+    job, with its tiles, and `remarks` what the user should know about the work.
     """
 
     tiles: int
@@ -117,7 +117,7 @@ class Progress(Tally):
     started: float = field(default_factory=time.perf_counter)
     tiles_before: int = 0
     views: list[Tally] = field(default_factory=list)
-    makers: dict[Maker, tuple[int, Tally]] = field(default_factory=dict)
+    render_devices: dict[RenderDevice, tuple[int, Tally]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -190,15 +190,15 @@ def run(
     # Closed at once, whatever happens here: the device is idle before an error or an interrupt is seen.
     with closing(executor.execute(job, items, token)) as results:
         for result in results:
-            store, maker = stores[result.view], result.maker
-            if maker is not None:
-                tiles, tally = state.makers.setdefault(maker, (0, Tally()))
+            store, render_device = stores[result.view], result.render_device
+            if render_device is not None:
+                tiles, tally = state.render_devices.setdefault(render_device, (0, Tally()))
                 tally.add(result.tally)
-                state.makers[maker] = (tiles + len(result.tiles), tally)
-            elif store.makers.known:  # an earlier run had several devices
-                maker = Maker.of(job.device.index, job.device.name, job.device.key)
+                state.render_devices[render_device] = (tiles + len(result.tiles), tally)
+            elif store.provenance.known:  # an earlier run had several devices
+                render_device = RenderDevice.of(job.device.index, job.device.name, job.device.key)
             if len(result.tiles):
-                store.put_tiles(result.tiles, result.film, maker)
+                store.put_tiles(result.tiles, result.film, render_device)
             if result.remark:
                 state.remarks.append(result.remark)
             state.tiles_done += len(result.tiles)
@@ -210,6 +210,6 @@ def run(
             if progress is not None:
                 progress(state)
     for store in stores:
-        for key, value in store.makers.header(store.done).items():
+        for key, value in store.provenance.header(store.done).items():
             store.tell(key, value)
     return state

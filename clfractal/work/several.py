@@ -15,7 +15,7 @@ from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS
 from clfractal.device.select import SPEEDS, Device, DeviceInfo, has_float64
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
-from clfractal.pictures.makers import Maker
+from clfractal.pictures.provenance import RenderDevice
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.work.hands import Hands
 from clfractal.work.job import Job, Kind
@@ -204,7 +204,7 @@ class SeveralExecutor:
                 tally = replace(told.result.tally, build_ms=max(built) - before)
                 self._own(told.result, numbers[told.place])
                 missing -= len(told.result.tiles)
-                yield replace(told.result, tally=tally, maker=maker_of(executor.device.info))
+                yield replace(told.result, tally=tally, render_device=render_device_of(executor.device.info))
                 continue
             if told.place not in hands.running:  # it hung, and its end is no news
                 continue
@@ -304,6 +304,6 @@ def _is_of_text(error: DeviceError | KernelBuildError) -> bool:
     return isinstance(error, KernelBuildError) and error.status == STATUS_BAD_INPUT
 
 
-def maker_of(device: DeviceInfo) -> Maker:
+def render_device_of(device: DeviceInfo) -> RenderDevice:
     """How a picture calls the device."""
-    return Maker.of(device.index, device.name, device.key)
+    return RenderDevice.of(device.index, device.name, device.key)

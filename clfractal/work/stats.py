@@ -68,16 +68,18 @@ def statistics(
         "peak_memory_mb": round(peak_memory_mb(), 1),
         "remarks": list(remarks),
     }
-    if state.makers:
+    if state.render_devices:
         values["devices"] = [
             {
-                "index": maker.index,
-                "device": maker.name,
+                "index": render_device.index,
+                "device": render_device.name,
                 "tiles": tiles,
                 "rays": tally.rays,
                 "kernel_ms": round(tally.kernel_ms, 3),
             }
-            for maker, (tiles, tally) in sorted(state.makers.items(), key=lambda each: each[0].index)
+            for render_device, (tiles, tally) in sorted(
+                state.render_devices.items(), key=lambda each: each[0].index
+            )
         ]
     if job.scene.stereo is not None:
         values["stereo"] = _of_stereo(job, comfort)

@@ -68,7 +68,9 @@ class Played:
 
 def an_answer(job: Job, item: WorkItem, worker: str = "tcp://host:0") -> tasks.Answer:
     film = np.zeros((len(item.tiles), len(job.channels), TILE, TILE), np.float32)
-    return tasks.Answer(item.view, item.tiles, film, Tally(), 1.0, worker, "w0", tasks.maker_of(job.device))
+    return tasks.Answer(
+        item.view, item.tiles, film, Tally(), 1.0, worker, "w0", tasks.render_device_of(job.device)
+    )
 
 
 def linked(client: Any, members: list[Member], told: list[str] | None = None) -> Link:
@@ -131,7 +133,7 @@ def test_permits_come_back_when_work_is_dropped_as_its_answer_comes(job: Job) ->
     asyncio.run(main())
 
 
-def test_each_answer_tells_its_maker(job: Job) -> None:
+def test_each_answer_tells_its_render_device(job: Job) -> None:
     """In the results, and in what each worker has done; the first worker's device counts for no other's tiles."""
     other = replace(job.device, name="another", driver="another")
     answers = {
@@ -139,7 +141,7 @@ def test_each_answer_tells_its_maker(job: Job) -> None:
         1: replace(
             an_answer(job, WorkItem(0, np.array([1, 2, 3], np.int32), (0, 1)), "tcp://host:1"),
             name="w1",
-            maker=tasks.maker_of(other),
+            render_device=tasks.render_device_of(other),
         ),
     }
     cluster = Cluster.__new__(Cluster)
@@ -155,8 +157,8 @@ def test_each_answer_tells_its_maker(job: Job) -> None:
     cluster._digests = Digests()
     cluster._call = lambda function, *values: function(*values) if function else None  # type: ignore[method-assign]
     items = [WorkItem(0, np.arange(4, dtype=np.int32), (0, job.samples))]
-    found = {result.maker: result.tiles.tolist() for result in cluster.execute(job, items)}
-    assert found == {tasks.maker_of(job.device): [0], tasks.maker_of(other): [1, 2, 3]}
+    found = {result.render_device: result.tiles.tolist() for result in cluster.execute(job, items)}
+    assert found == {tasks.render_device_of(job.device): [0], tasks.render_device_of(other): [1, 2, 3]}
     assert [(each.name, each.device, each.tiles) for each in cluster.shares()] == [
         ("w0", job.device.name, 1),
         ("w1", "another", 3),

@@ -100,11 +100,11 @@ def renamed(info):
     return replace(info, name="another", driver="another")
 
 tasks.choose = lambda wanted, usual=tasks.choose: SimpleNamespace(info=renamed(usual(wanted).info))
-tasks.maker_of = lambda info, usual=tasks.maker_of: usual(renamed(info))
+tasks.render_device_of = lambda info, usual=tasks.render_device_of: usual(renamed(info))
 """
 
 
-def test_makers_are_those_that_made_the_tiles(folder: Path) -> None:
+def test_render_devices_are_those_that_made_the_tiles(folder: Path) -> None:
     """Of workers of two kinds; in the header, the journal of what was left by a kill, and the statistics."""
     with Farm(folder, workers=1) as farm:
         farm.add(preload=ANOTHER_KIND)

@@ -291,16 +291,16 @@ def test_who_made_a_tile_is_kept(tmp_path: Path) -> None:
         journal.append(0, tiles[2], 250)
     with closing(Journal.resume(path, identity, channels, 10)) as journal:
         assert journal.done.nonzero()[0].tolist() == [0, 7, 9]
-        assert journal.makers.tolist() == [250, 0, 0, 0, 0, 0, 0, 0, 0, 2]
+        assert journal.provenance.tolist() == [250, 0, 0, 0, 0, 0, 0, 0, 0, 2]
         assert journal.notes[2]["name"] == "a device of Ångström"
         assert set(journal.notes) == {2}
         assert journal.notes[2]["key"] == "k" * len(journal.notes[2]["key"])
         for index, tile in ((7, tiles[0]), (9, tiles[1]), (0, tiles[2])):
             np.testing.assert_array_equal(journal.tile(index), tile)
         journal.append(9, tiles[3], 1)  # done again by another
-        assert journal.makers[9] == 1
+        assert journal.provenance[9] == 1
     with closing(Journal.resume(path, identity, channels, 10)) as journal:
-        assert journal.makers[9] == 1
+        assert journal.provenance[9] == 1
         np.testing.assert_array_equal(journal.tile(9), tiles[3])
 
 

@@ -17,7 +17,7 @@ _LONGEST_LIST = 1 << 20
 
 
 @dataclass(frozen=True, slots=True)
-class Maker:
+class RenderDevice:
     """A device that makes tiles: its index as in `--device 0:0`, its name, and a short name of its `DeviceInfo.key`."""
 
     index: str
@@ -25,7 +25,7 @@ class Maker:
     key: str
 
     @classmethod
-    def of(cls, index: str, name: str, key: str) -> Maker:
+    def of(cls, index: str, name: str, key: str) -> RenderDevice:
         """With the whole key, of which a digest is kept."""
         return cls(index, name, hashlib.sha256(key.encode()).hexdigest()[:16])
 
@@ -37,41 +37,42 @@ class Maker:
         return f"{self.index} {self.name}".strip()
 
 
-class Makers:
-    """The makers of a picture's tiles, numbered from 1 as they come; 0 is the device of a picture that one made alone."""
+class Provenance:
+    """The devices of a picture's tiles, numbered from 1 as they come; 0 is the device of a picture that one made alone."""
 
     def __init__(self, tiles: int) -> None:
-        self.known: list[Maker] = []
+        self.known: list[RenderDevice] = []
         self.of_tiles = np.zeros(tiles, np.uint8)
 
-    def number(self, maker: Maker) -> int:
-        """The number of a maker, a new one if it has none."""
-        if maker in self.known:
-            return self.known.index(maker) + 1
+    def number(self, device: RenderDevice) -> int:
+        """The number of a device, a new one if it has none."""
+        if device in self.known:
+            return self.known.index(device) + 1
         if len(self.known) < MOST:
-            self.known.append(maker)
+            self.known.append(device)
         return len(self.known)
 
-    def put(self, tiles: npt.NDArray[np.int32] | int, maker: Maker) -> None:
+    def put(self, tiles: npt.NDArray[np.int32] | int, device: RenderDevice) -> None:
         """Says who made tiles."""
-        self.of_tiles[tiles] = self.number(maker)
+        self.of_tiles[tiles] = self.number(device)
 
-    def counts(self, done: npt.NDArray[np.bool_]) -> dict[Maker, int]:
-        """How many of the finished tiles each maker made; of makers of none nothing is told."""
+    def counts(self, done: npt.NDArray[np.bool_]) -> dict[RenderDevice, int]:
+        """How many of the finished tiles each device made; of devices that made none nothing is told."""
         found = np.bincount(self.of_tiles[done], minlength=len(self.known) + 1)
-        return {maker: int(count) for maker, count in zip(self.known, found[1:], strict=True) if count}
+        return {device: int(count) for device, count in zip(self.known, found[1:], strict=True) if count}
 
     def header(self, done: npt.NDArray[np.bool_]) -> dict[str, Any]:
         """Entries of a picture's header; none if one device made it alone.
 
-        `devices` has a line for each maker, and `tileDevices` the numbers of these lines, counted from 1, for all tiles
+        `devices` has a line for each device, and `tileDevices` the numbers of these lines, counted from 1, for all tiles
         from the top left, row by row: `2*1 14*2` are two tiles of the first and fourteen of the second.
         """
         if not self.known:
             return {}
         counts = self.counts(done)
         lines = [
-            f"{number}: {maker}: {_tiles(counts.get(maker, 0))}" for number, maker in enumerate(self.known, 1)
+            f"{number}: {device}: {_tiles(counts.get(device, 0))}"
+            for number, device in enumerate(self.known, 1)
         ]
         alone = int(np.count_nonzero(done & (self.of_tiles == 0)))
         if alone:
@@ -80,14 +81,14 @@ class Makers:
         return {"devices": "\n".join(lines)} | ({"tileDevices": runs} if len(runs) <= _LONGEST_LIST else {})
 
 
-def lines_of(counts: Iterable[dict[Maker, int]]) -> str:
+def lines_of(counts: Iterable[dict[RenderDevice, int]]) -> str:
     """The same lines for a picture that is made of several; empty if one device made them alone."""
-    total: dict[Maker, int] = {}
+    total: dict[RenderDevice, int] = {}
     for each in counts:
-        for maker, tiles in each.items():
-            total[maker] = total.get(maker, 0) + tiles
+        for device, tiles in each.items():
+            total[device] = total.get(device, 0) + tiles
     return "\n".join(
-        f"{number}: {maker}: {_tiles(tiles)}" for number, (maker, tiles) in enumerate(total.items(), 1)
+        f"{number}: {device}: {_tiles(tiles)}" for number, (device, tiles) in enumerate(total.items(), 1)
     )
 
 
