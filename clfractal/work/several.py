@@ -17,7 +17,7 @@ from clfractal.device.select import SPEEDS, Device, DeviceInfo, has_float64
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.pictures.provenance import RenderDevice
 from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.work.hands import Hands
+from clfractal.work.device_workers import DeviceWorkers
 from clfractal.work.job import Job, Kind
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import lanes_of, pays_to_measure
@@ -112,13 +112,13 @@ class SeveralExecutor:
         numbers = list(jobs)
         all_items = list(items)
         shared = Shared(self._offers(job, all_items, numbers), self._known_speeds(numbers))
-        hands = Hands([self.executors[number] for number in numbers], list(jobs.values()), shared)
+        workers = DeviceWorkers([self.executors[number] for number in numbers], list(jobs.values()), shared)
         tiles = shared.count
         try:
-            hands.start()
-            yield from self._results(job, numbers, hands, tiles, token)
+            workers.start()
+            yield from self._results(job, numbers, workers, tiles, token)
         finally:
-            for place, seconds in hands.end():
+            for place, seconds in workers.end():
                 executor = self.executors[numbers[place]]
                 self._hung.add(id(executor))
                 with suppress(DeviceError):  # if it was the last one, the next job will tell
@@ -177,20 +177,25 @@ class SeveralExecutor:
             executor.close()
 
     def _results(
-        self, job: Job, numbers: Sequence[int], hands: Hands, missing: int, token: CancelToken | None
+        self,
+        job: Job,
+        numbers: Sequence[int],
+        workers: DeviceWorkers,
+        missing: int,
+        token: CancelToken | None,
     ) -> Generator[Result]:
         """What the devices tell, until all of so many missing tiles are there."""
-        shared = hands.shared
+        shared = workers.shared
         built = [0.0] * len(numbers)
         # A result of a device that was lost meanwhile may still be on its way.
-        while hands.running or (missing and shared.finished):
-            if not missing and not self._waits_for(hands):
+        while workers.running or (missing and shared.finished):
+            if not missing and not self._waits_for(workers):
                 return
             if token is not None:
                 token.check()
-            told = hands.next()
-            for place, seconds in hands.silent():
-                hands.abandon(place)
+            told = workers.next()
+            for place, seconds in workers.silent():
+                workers.abandon(place)
                 executor = self.executors[numbers[place]]
                 self._hung.add(id(executor))
                 yield _remark(self.leave_out(executor.device, _silent(executor.device, seconds)))
@@ -206,9 +211,9 @@ class SeveralExecutor:
                 missing -= len(told.result.tiles)
                 yield replace(told.result, tally=tally, render_device=render_device_of(executor.device.info))
                 continue
-            if told.place not in hands.running:  # it hung, and its end is no news
+            if told.place not in workers.running:  # it hung, and its end is no news
                 continue
-            hands.running.discard(told.place)
+            workers.running.discard(told.place)
             if told.error is None:
                 continue
             failed = told.error
@@ -218,16 +223,16 @@ class SeveralExecutor:
         if not shared.finished:  # the devices that are left have no part in this job
             raise self._nothing_left()
 
-    def _waits_for(self, hands: Hands) -> bool:
+    def _waits_for(self, workers: DeviceWorkers) -> bool:
         """Whether programs that are still being built are waited for, when all is done without them.
 
         Once they are given up, so that a picture is there as soon as it can be. A second picture tells that there will be
         more, and that their devices are worth waiting for; but not for ever.
         """
-        if not any(hands.shared.prepares(place) for place in hands.running):
+        if not any(workers.shared.prepares(place) for place in workers.running):
             return False
         waits, self._gave_up = self._gave_up, True
-        return waits and hands.idle < _LONGEST_BUILD
+        return waits and workers.idle < _LONGEST_BUILD
 
     def _offers(self, job: Job, items: Sequence[WorkItem], numbers: Sequence[int]) -> list[Offer]:
         """What is to be done, and which tiles belong to a device."""

@@ -60,7 +60,7 @@ class Offer:
 
 
 @dataclass(slots=True)
-class _Hand:
+class _WorkerState:
     """What one device does: launches under way, and its speed in this job."""
 
     speed: float
@@ -86,7 +86,7 @@ class Shared:
 
     def __init__(self, offers: Sequence[Offer], speeds: Sequence[float]) -> None:
         self._offers = [offer for offer in offers if offer.count]
-        self._hands = [_Hand(speed) for speed in speeds]
+        self._workers = [_WorkerState(speed) for speed in speeds]
         self._changed = threading.Condition()
         self._stopped = False
 
@@ -99,7 +99,7 @@ class Shared:
     def prepares(self, device: int) -> bool:
         """Whether a device has not come to its first launch yet."""
         with self._changed:
-            return self._hands[device].began is None
+            return self._workers[device].began is None
 
     @property
     def finished(self) -> bool:
@@ -117,27 +117,27 @@ class Shared:
         while True:
             with self._changed:
                 while (offer := self._next(device)) is None:
-                    if self._stopped or self._hands[device].lost or self._all_done():
+                    if self._stopped or self._workers[device].lost or self._all_done():
                         return
                     self._changed.wait(_LOOK_SECONDS)
-                self._hands[device].offer = offer
+                self._workers[device].offer = offer
             yield offer.item
 
     def take(self, device: int, most: int) -> Tiles:
         """Tiles for a device's next launch, of the item that it has got: at most so many; none if it should take none."""
         with self._changed:
-            hand, now = self._hands[device], time.perf_counter()
-            hand.signs += 1
-            if hand.began is None:
-                hand.began = hand.last = now
-            if self._stopped or hand.lost or hand.offer is None:
+            worker, now = self._workers[device], time.perf_counter()
+            worker.signs += 1
+            if worker.began is None:
+                worker.began = worker.last = now
+            if self._stopped or worker.lost or worker.offer is None:
                 return _NO_TILES
-            tiles = hand.offer.take(self._allowed(device, hand.offer, most, now))
+            tiles = worker.offer.take(self._allowed(device, worker.offer, most, now))
             if len(tiles):
-                if not hand.flying:
-                    hand.last = now
-                hand.flying.append((hand.offer, tiles))
-                hand.flown += len(tiles)
+                if not worker.flying:
+                    worker.last = now
+                worker.flying.append((worker.offer, tiles))
+                worker.flown += len(tiles)
             return tiles
 
     def done(self, device: int, tiles: Tiles) -> bool:
@@ -147,51 +147,51 @@ class Shared:
             Whether they count: those of a lost device are others' work by now.
         """
         with self._changed:
-            hand = self._hands[device]
-            if hand.lost:
+            worker = self._workers[device]
+            if worker.lost:
                 return False
-            hand.signs += 1
+            worker.signs += 1
             if len(tiles):
-                offer, taken = hand.flying.popleft()
+                offer, taken = worker.flying.popleft()
                 assert np.array_equal(taken[: len(tiles)], tiles)
                 if len(taken) > len(tiles):
-                    hand.flying.appendleft((offer, taken[len(tiles) :]))
-                hand.flown -= len(tiles)
-                hand.done += len(tiles)
-                hand.last = time.perf_counter()
+                    worker.flying.appendleft((offer, taken[len(tiles) :]))
+                worker.flown -= len(tiles)
+                worker.done += len(tiles)
+                worker.last = time.perf_counter()
                 self._changed.notify_all()
             return True
 
     def owes(self, device: int) -> bool:
         """Whether tiles wait for a device that has begun: those that it has taken, and those that only it may take."""
         with self._changed:
-            hand = self._hands[device]
+            worker = self._workers[device]
             own = any(offer.device == device and offer.left for offer in self._offers)
-            return hand.began is not None and not hand.lost and (bool(hand.flying) or own)
+            return worker.began is not None and not worker.lost and (bool(worker.flying) or own)
 
     def signs(self, device: int) -> int:
         """How often a device has taken tiles or told of its work: if that grows, it lives."""
         with self._changed:
-            return self._hands[device].signs
+            return self._workers[device].signs
 
     def patience(self, device: int) -> float:
         """For how many seconds a device may give no sign before it is taken for hung."""
         with self._changed:
-            measured = any(each.done for each in self._hands)
-            expected = self._hands[device].flown / self._speeds()[device] if measured else 0.0
+            measured = any(each.done for each in self._workers)
+            expected = self._workers[device].flown / self._speeds()[device] if measured else 0.0
             return max(_TIMES_LATE * expected, _SHORTEST_PATIENCE)
 
     def lose(self, device: int) -> None:
         """A device has failed, or hangs: the others do what it has taken, from the first sample on."""
         with self._changed:
-            hand = self._hands[device]
-            hand.lost = True
-            again = [*hand.flying]
+            worker = self._workers[device]
+            worker.lost = True
+            again = [*worker.flying]
             again += [
                 (offer, part) for offer in self._offers if offer.device == device for part in offer.left
             ]
-            hand.flying.clear()
-            hand.flown = 0
+            worker.flying.clear()
+            worker.flown = 0
             for offer in self._offers:
                 if offer.device == device:
                     offer.left.clear()
@@ -207,11 +207,13 @@ class Shared:
             self._changed.notify_all()
 
     def _all_done(self) -> bool:
-        return not any(hand.flying for hand in self._hands) and not any(offer.left for offer in self._offers)
+        return not any(worker.flying for worker in self._workers) and not any(
+            offer.left for offer in self._offers
+        )
 
     def _next(self, device: int) -> Offer | None:
         """The first offer of which a device should take some tiles now."""
-        if self._stopped or self._hands[device].lost:
+        if self._stopped or self._workers[device].lost:
             return None
         now = time.perf_counter()
         for offer in self._offers:
@@ -226,16 +228,18 @@ class Shared:
             return min(most, left)
         speeds = self._speeds()
         working = [
-            number for number, hand in enumerate(self._hands) if not hand.lost and hand.began is not None
+            number
+            for number, worker in enumerate(self._workers)
+            if not worker.lost and worker.began is not None
         ]
         others = [number for number in working if number != device]
         if not others:
             return min(most, left)
-        hand = self._hands[device]
+        worker = self._workers[device]
         all_left = sum(each.count for each in self._offers if each.device is None)
-        all_left += sum(self._hands[number].flown for number in working)
+        all_left += sum(self._workers[number].flown for number in working)
         share = speeds[device] / sum(speeds[number] for number in {*working, device})
-        fair = share * all_left - hand.flown
+        fair = share * all_left - worker.flown
         least = max(1, min(int(_SMALLEST * most), left))
         wanted = min(most, left, max(least, int(_PART * fair)))
         if wanted <= fair:
@@ -249,19 +253,19 @@ class Shared:
 
     def _busy(self, device: int, speeds: Sequence[float], now: float) -> float:
         """Seconds until a device is done with what it has taken; one that is late will be as late again."""
-        hand = self._hands[device]
-        if not hand.flown:
+        worker = self._workers[device]
+        if not worker.flown:
             return 0.0
-        late = now - hand.last - hand.flown / speeds[device]
+        late = now - worker.last - worker.flown / speeds[device]
         return -late if late < 0 else late
 
     def _speeds(self) -> list[float]:
         """Tiles a second; of devices that have not done any yet, in proportion to what was known before."""
         measured = {
-            number: hand.done / max(hand.last - hand.began, 1e-6)
-            for number, hand in enumerate(self._hands)
-            if hand.done and hand.began is not None
+            number: worker.done / max(worker.last - worker.began, 1e-6)
+            for number, worker in enumerate(self._workers)
+            if worker.done and worker.began is not None
         }
-        ratios = [math.log(measured[number] / self._hands[number].speed) for number in measured]
+        ratios = [math.log(measured[number] / self._workers[number].speed) for number in measured]
         scale = math.exp(sum(ratios) / len(ratios)) if ratios else 1.0
-        return [measured.get(number, hand.speed * scale) for number, hand in enumerate(self._hands)]
+        return [measured.get(number, worker.speed * scale) for number, worker in enumerate(self._workers)]

@@ -200,7 +200,7 @@ def test_patience_follows_the_measured_speed(monkeypatch: pytest.MonkeyPatch) ->
     monkeypatch.setattr(sharing, "time", clock)
     shared = Shared([offer(100)], [1.0, 1.0])
     for device in (0, 1):
-        shared._hands[device].offer = shared._offers[0]
+        shared._workers[device].offer = shared._offers[0]
         assert not shared.owes(device)  # it is not ready yet: nobody knows how long compiling takes
         assert not len(shared.take(device, 0))
         assert not shared.owes(device)
@@ -220,7 +220,7 @@ def test_patience_follows_the_measured_speed(monkeypatch: pytest.MonkeyPatch) ->
 def test_what_a_lost_device_tells_does_not_count() -> None:
     shared = Shared([offer(10)], [1.0, 1.0])
     for device in (0, 1):
-        shared._hands[device].offer = shared._offers[0]
+        shared._workers[device].offer = shared._offers[0]
     tiles = shared.take(0, 4)
     signs = shared.signs(0)
     assert len(tiles)

@@ -26,7 +26,7 @@ def simulated(
     monkeypatch.setattr(sharing, "time", clock)
     shared = Shared([offer(tiles)], known)
     for device in range(len(speeds)):
-        shared._hands[device].offer = shared._offers[0]  # as `items` does, which may wait
+        shared._workers[device].offer = shared._offers[0]  # as `items` does, which may wait
         assert not len(shared.take(device, 0))  # its programs are there
     ends, done, free = [0.0] * len(speeds), [0] * len(speeds), [0.0] * len(speeds)
     seen = np.zeros(tiles, np.int64)

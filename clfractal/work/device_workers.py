@@ -34,7 +34,7 @@ class Told:
     error: BaseException | None = None
 
 
-class Hands:
+class DeviceWorkers:
     """A thread for each device of a job. Devices are numbered by their places here.
 
     Threads are daemons: one that never comes back from its driver does not keep the process from ending.
@@ -57,7 +57,7 @@ class Hands:
         self._signs = [0] * len(executors)
         self._threads = [
             threading.Thread(
-                target=_Hand(executor, job, shared, place, self._inbox, self._token),
+                target=_DeviceWorker(executor, job, shared, place, self._inbox, self._token),
                 name=f"clfractal-{executor.device.info.index}",
                 daemon=True,
             )
@@ -120,7 +120,7 @@ class Hands:
         return silent
 
 
-class _Hand:
+class _DeviceWorker:
     """What a device's thread does: tiles as long as there are any for it."""
 
     def __init__(
