@@ -16,7 +16,7 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName, Stereo
 from clfractal.work import comfort
-from clfractal.work import look as look_module
+from clfractal.work import preview as preview_module
 from clfractal.work.comfort import (
     Comfort,
     comfort_of,
@@ -25,7 +25,7 @@ from clfractal.work.comfort import (
     measured,
 )
 from clfractal.work.job import Job
-from clfractal.work.look import Look, points_of_depth
+from clfractal.work.preview import Preview, points_of_depth
 from clfractal.work.run import run
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, shoot
 from tests.scenes import scene_of
@@ -51,9 +51,9 @@ def device() -> Device:
 
 
 @pytest.fixture(scope="module")
-def look(device: Device) -> Look:
-    """The look of an engine, which keeps what its looks have in common."""
-    return engine_of(device).look
+def preview(device: Device) -> Preview:
+    """The preview of an engine, which keeps what its previews have in common."""
+    return engine_of(device).preview
 
 
 def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> Scene:
@@ -67,7 +67,7 @@ def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> Scene:
 
 
 class TestMeasured:
-    def test_a_ball(self, look: Look) -> None:
+    def test_a_ball(self, preview: Preview) -> None:
         """Seen from depth d - r to the circle where lines from an eye touch it. That lies r^2 / l before its middle, on the
         way to an eye at a distance l, and has the radius r sqrt(1 - r^2 / l^2); an eye that is beside the middle by a sees
         a / l of that radius deeper on its own side. The plane is at d, so the parallax at depth z is e (1 - d / z)."""
@@ -78,7 +78,7 @@ class TestMeasured:
         distance = np.hypot(d, a)
         near = d - r
         far = d - d * (r / distance) ** 2 + r * np.sqrt(1 - (r / distance) ** 2) * a / distance
-        found = measured(scene, look)
+        found = measured(scene, preview)
         assert found is not None
         # A hit may lie a pixel or two before the surface, and no pixel's middle is exactly on the nearest point or the rim.
         pixel = high / 160
@@ -88,31 +88,31 @@ class TestMeasured:
         ends = degrees(Stereo.model_validate({**VIEWER}), [found.nearest, found.farthest])
         np.testing.assert_allclose([found.nearest_degrees, found.farthest_degrees], ends)
 
-    def test_a_look_is_quick(self, look: Look, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_preview_is_quick(self, preview: Preview, monkeypatch: pytest.MonkeyPatch) -> None:
         """However large the picture and how many its samples: 320 pixels on the longer side, one ray each."""
-        looks: list[tuple[int, int, int, tuple[str, ...]]] = []
+        previews: list[tuple[int, int, int, tuple[str, ...]]] = []
 
         def watched(job: Job, *arguments: Any, **named: Any) -> Any:
             (view,) = job.views
-            looks.append((*view.size, view.plan.samples, view.plan.channels))
+            previews.append((*view.size, view.plan.samples, view.plan.channels))
             return run(job, *arguments, **named)
 
-        monkeypatch.setattr(look_module, "run", watched)
+        monkeypatch.setattr(preview_module, "run", watched)
         large = seen("ball", (16000, 4000))
         large = large.model_copy(update={"renderer": large.renderer.model_copy(update={"samples": 64})})
         same = large.model_copy(update={"image": large.image.resized(320, 80)})
-        found, small = measured(large, look), measured(same, look)
-        assert looks == [(320, 80, 1, ("R", "G", "B", "A", "Z"))] * 4  # of either eye
+        found, small = measured(large, preview), measured(same, preview)
+        assert previews == [(320, 80, 1, ("R", "G", "B", "A", "Z"))] * 4  # of either eye
         assert found == small
 
-    def test_all_views_of_a_layout(self, look: Look) -> None:
+    def test_all_views_of_a_layout(self, preview: Preview) -> None:
         """The nearest and the farthest of any; a plane by itself has none, and nothing seen is nothing."""
         away = {"camera": {"position": [0, -3, 0], "target": [0, -9, 0]}}
         plane = {"renderer": {"type": "cut_plane"}}
 
         def of(*views: dict[str, Any]) -> Comfort | None:
             layout = {"views": list(views)}
-            return measured(scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout=layout), look)
+            return measured(scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout=layout), preview)
 
         near = of({}, {})
         assert near is not None
@@ -154,15 +154,15 @@ class TestFitted:
     @pytest.mark.parametrize("budget", [0.3, 1.0])
     @pytest.mark.parametrize("kind", SOLIDS_SEEN)
     def test_all_of_the_depth_is_within_the_budget(
-        self, device: Device, look: Look, kind: str, budget: float
+        self, device: Device, preview: Preview, kind: str, budget: float
     ) -> None:
-        """Of the picture's own pixels, of both eyes, which are finer than those of the quick look."""
+        """Of the picture's own pixels, of both eyes, which are finer than those of the preview."""
         scene = seen(kind, (400, 330), fit="auto", budget=budget)
-        found = fitted(scene, look)
+        found = fitted(scene, preview)
         assert found.stereo is not None
         assert found.stereo.fit is None
         assert 0 < found.stereo.separation <= 1
-        told = measured(found, look)
+        told = measured(found, preview)
         assert told is not None
         assert told.nearest < 0 < told.farthest
         assert told.nearest_degrees == pytest.approx(-told.farthest_degrees, rel=0.06)
@@ -174,10 +174,10 @@ class TestFitted:
         assert found.stereo.separation == 1 or told.worst_degrees > 0.9 * budget
 
     @pytest.mark.parametrize("kind", ["ball", "near"])
-    def test_the_eye_between_stays(self, look: Look, kind: str) -> None:
+    def test_the_eye_between_stays(self, preview: Preview, kind: str) -> None:
         """What it sees is as without a fit: only the screen moves, through the picture."""
         before = scene_view(seen(kind))
-        scene = fitted(seen(kind, fit="auto"), look)
+        scene = fitted(seen(kind, fit="auto"), preview)
         after = scene_view(scene)
         np.testing.assert_allclose(after.origin, before.origin, atol=1e-12)
         np.testing.assert_allclose(after.axis, before.axis, atol=1e-12)
@@ -185,28 +185,28 @@ class TestFitted:
         assert after.height / after.width == pytest.approx(before.height / before.width)
         assert eye_distance(after) < eye_distance(before)  # nearer than the target in the middle of the ball
 
-    def test_its_own_plane_stays(self, look: Look) -> None:
+    def test_its_own_plane_stays(self, preview: Preview) -> None:
         plane = {"center": [0, -0.3, 0], "normal": [0.1, -1, 0.2], "width": 3.0}
         scene = seen("ball", fit="auto", plane=plane, budget=0.5)
-        found = fitted(scene, look)
+        found = fitted(scene, preview)
         assert found.stereo is not None
         assert scene.stereo is not None
         assert found.stereo == scene.stereo.model_copy(
             update={"fit": None, "separation": found.stereo.separation}
         )
-        told = measured(found, look)
+        told = measured(found, preview)
         assert told is not None
         assert told.worst_degrees == pytest.approx(0.95 * 0.5, rel=1e-3)
 
-    def test_what_fits_already_keeps_its_separation(self, look: Look) -> None:
+    def test_what_fits_already_keeps_its_separation(self, preview: Preview) -> None:
         for separation in (0.05, 0.0):
-            found = fitted(seen("ball", fit="auto", separation=separation), look)
+            found = fitted(seen("ball", fit="auto", separation=separation), preview)
             assert found.stereo is not None
             assert found.stereo.separation == separation
 
-    def test_a_scene_without_fit_stays_itself(self, look: Look) -> None:
+    def test_a_scene_without_fit_stays_itself(self, preview: Preview) -> None:
         for scene in (seen("ball"), scene_of(BALL, CAMERA)):
-            assert fitted(scene, look) is scene
+            assert fitted(scene, preview) is scene
 
     @given(
         st.tuples(st.floats(1e-3, 1e3), st.floats(1.0, 1e4)),

@@ -109,7 +109,7 @@ def test_progress_goes_on_over_both_eyes() -> None:
 
 
 def test_a_volumes_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """By both eyes, and by the look that a fit takes before: what is rendered is what was checked."""
+    """By both eyes, and by the preview that a fit takes before: what is rendered is what was checked."""
     places = np.stack(np.meshgrid(*[np.linspace(-1.2, 1.2, 24)] * 3, indexing="ij"))
     ball = (np.linalg.norm(places, axis=0) < 1).astype(np.uint8) * 255
     keep(tmp_path / "ball.nrrd", ball, [-1.2] * 3, [0.1] * 3)
@@ -129,5 +129,5 @@ def test_a_volumes_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
         film = clfractal.render(scene)
         assert 0.1 < (film["A"] > 0).mean() < 1
         assert film["R"].shape == (36, 80 if mode == "split" else 40)
-        fitted(scene, clfractal.Engine().look)
+        fitted(scene, clfractal.Engine().preview)
         assert reads == [tmp_path]

@@ -109,7 +109,7 @@ def test_compiling_for_looks_counts() -> None:
         before = engine.device.loaded.building.milliseconds
         film = engine.render(SCENE + "stereo: {fit: auto, mode: anaglyph}\n")
         built = engine.device.loaded.building.milliseconds - before
-        assert 0 < engine.looks_built_ms <= built
+        assert 0 < engine.previews_built_ms <= built
         assert film.stats["build_ms"] == pytest.approx(built, abs=0.01)
 
 

@@ -20,7 +20,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.work.any_engine import AnyEngine, SceneLike
 from clfractal.work.job import Job
-from clfractal.work.look import Look
+from clfractal.work.preview import Preview
 from clfractal.work.run import Executor
 
 # Frames of a film that are rendered before they are asked for, at most: their results lie with the workers, bytes.
@@ -71,9 +71,9 @@ class ClusterEngine(AnyEngine):
         self._closed = True
 
     @property
-    def look(self) -> Look:
-        """Quick looks, by a worker."""
-        return _DistantLook(self.cluster)
+    def preview(self) -> Preview:
+        """Previews, by a worker."""
+        return _DistantPreview(self.cluster)
 
     def settled(self, scene: SceneLike) -> Scene:
         """See `Engine.settled`; a worker measures."""
@@ -154,7 +154,7 @@ class ClusterEngine(AnyEngine):
         return _Asked(future, message)
 
     def _decided(self, asked: _Asked) -> Job:
-        answer, self.looks_built_ms = self.cluster.answered(asked.future)
+        answer, self.previews_built_ms = self.cluster.answered(asked.future)
         job: Job = self.cluster.unpacked(answer, asked.message)
         job = replace(job, views=tuple(self._in_first_lanes(view, job.device.key) for view in job.views))
         remark = self._remark(job)
@@ -184,14 +184,14 @@ class _Asked:
     message: Message
 
 
-class _DistantLook(Look):
-    """Looks of a worker; what is seen comes back as points."""
+class _DistantPreview(Preview):
+    """Previews of a worker; what is seen comes back as points."""
 
     def __init__(self, cluster: Workers) -> None:
         self._cluster = cluster
 
     def points(self, scene: Scene, eye: Eye = MIDDLE) -> npt.NDArray[np.float64]:
-        """See `Look.points`."""
+        """See `Preview.points`."""
         from clfractal.cluster import tasks
 
         asked, _ = self._cluster.asking(tasks.points, (scene, eye))

@@ -179,11 +179,11 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
 def prepared(
     seat: Seat, data: bytes, arrays: Arrays, settings: dict[str, Any]
 ) -> tuple[Message, float] | Failure | Interrupted:
-    """The job of a scene, and the milliseconds of building programs for looks."""
+    """The job of a scene, and the milliseconds of building programs for previews."""
 
     def work(engine: Engine, _: CancelToken) -> tuple[Message, float]:
         job = engine.prepare(unpack(data, arrays), **settings)
-        return _packed(job, arrays), engine.looks_built_ms
+        return _packed(job, arrays), engine.previews_built_ms
 
     return _answered(seat, work)
 
@@ -194,8 +194,8 @@ def settled(seat: Seat, data: bytes, arrays: Arrays) -> Message | Failure | Inte
 
 
 def points(seat: Seat, data: bytes, arrays: Arrays) -> Any:
-    """What an eye sees of a scene, as points: see `Look.points`."""
-    return _answered(seat, lambda engine, _: engine.look.points(*unpack(data, arrays)))
+    """What an eye sees of a scene, as points: see `Preview.points`."""
+    return _answered(seat, lambda engine, _: engine.preview.points(*unpack(data, arrays)))
 
 
 def kept(array: Any) -> Any:

@@ -243,7 +243,7 @@ def _render_on(
             if len(kinds) > 1 and not told:
                 told = True
                 shell.say(f"{order.scene}: {mixed_kinds(len(kinds))}")
-    counted.looks_built_ms, counted.shares = engine.looks_built_ms, shares_of(engine)
+    counted.previews_built_ms, counted.shares = engine.previews_built_ms, shares_of(engine)
     return counted
 
 

@@ -81,9 +81,9 @@ def _parallax(scene: Scene, wanted: str | None, shell: Shell) -> tuple[Scene, st
     from clfractal.work.comfort import fitted, measured
     from clfractal.work.engine import Engine
 
-    look = Engine(wanted, tell=shell.say).look
-    found = fitted(scene, look)
-    comfort = measured(found, look)
+    preview = Engine(wanted, tell=shell.say).preview
+    found = fitted(scene, preview)
+    comfort = measured(found, preview)
     if comfort is None:
         return found, "parallax: the picture is empty", ""
     return found, comfort.sentence(), comfort.warning()

@@ -20,7 +20,7 @@ class FilmCount:
         self._first = begun  # when the first frame was done, for which programs are compiled
         self._rendered, self._rays = 0, 0
         self.stats = FilmStats()
-        self.looks_built_ms = 0.0
+        self.previews_built_ms = 0.0
         self.shares: list[dict[str, Any]] | None = None  # of a cluster's workers
 
     @property
@@ -61,6 +61,6 @@ class FilmCount:
         values = self.stats.values(
             wall_ms=1e3 * (time.perf_counter() - self._begun),
             films_ms=films_ms,
-            looks_built_ms=self.looks_built_ms,
+            previews_built_ms=self.previews_built_ms,
         )
         return values if self.shares is None else {**values, "workers": self.shares}

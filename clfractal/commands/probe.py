@@ -42,7 +42,7 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
             Where("X,Y"),
         )
     with speaking_of(order.scene):
-        found = probed(job, x, y, engine.look)
+        found = probed(job, x, y, engine.preview)
     if as_json:
         shell.print_json(found.plain())
     else:

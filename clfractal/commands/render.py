@@ -108,7 +108,7 @@ def _render(
         if job.scene.stereo is not None:  # asked here, so that other scenes do not load what measures it
             from clfractal.work.comfort import comfort_of_job
 
-            comfort = comfort_of_job(job, unfinished.films, engine.look)
+            comfort = comfort_of_job(job, unfinished.films, engine.preview)
         remarks = remarks_of(job, state, unfinished.films, comfort)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(
@@ -116,7 +116,7 @@ def _render(
         state,
         wall_ms=1e3 * (written - start),
         write_ms=1e3 * (written - rendered),
-        looks_built_ms=engine.looks_built_ms,
+        previews_built_ms=engine.previews_built_ms,
         comfort=comfort,
         remarks=remarks,
     )

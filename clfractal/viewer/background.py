@@ -20,8 +20,8 @@ from clfractal.viewer.preparing import internal_error
 from clfractal.work.films import JobFilms
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.look import Look
 from clfractal.work.prepare import prepare
+from clfractal.work.preview import Preview
 from clfractal.work.run import Progress, run
 from clfractal.work.save import save_job
 from clfractal.work.settle import settled
@@ -85,10 +85,10 @@ def prepared(
     channels = ("R", "G", "B", "A") if colors else None
     if colors:
         scene = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
-    look = Look(executor.device, Cancellable(executor, token))
+    preview = Preview(executor.device, Cancellable(executor, token))
     if exposed_in is not None and isinstance(scene.output.exposure, str):
-        scene = with_exposure(scene, measured_exposure(exposed_in, look))
-    scene = settled(scene, look)
+        scene = with_exposure(scene, measured_exposure(exposed_in, preview))
+    scene = settled(scene, preview)
     return prepare(scene, executor.device, channels=channels, on_start=tell)
 
 

@@ -15,7 +15,7 @@ from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.look import Look
+from clfractal.work.preview import Preview
 from clfractal.work.run import Executor, Result, WorkItem
 from clfractal.work.settle import is_settled, settled
 
@@ -33,17 +33,17 @@ class Cancellable:
         return self._executor.execute(job, items, self._token)
 
 
-def measured_exposure(scene: Scene, look: Look) -> float:
+def measured_exposure(scene: Scene, preview: Preview) -> float:
     """The exposure of a scene with `auto`, stops.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
-        Stopped: the look was ended.
+        Stopped: the preview was ended.
     """
     try:
-        return settled(scene, look).output.stops
+        return settled(scene, preview).output.stops
     except SceneError:
-        return settled(_unfitted(scene), look).output.stops
+        return settled(_unfitted(scene), preview).output.stops
 
 
 def with_exposure(scene: Scene, stops: float) -> Scene:
@@ -79,18 +79,18 @@ class Fits:
 
         Args:
             exposed_in: the scene in which an exposure of `auto` is measured; None: `scene`.
-            executor: for looks, in the place of the usual one: another thread has its own.
+            executor: for previews, in the place of the usual one: another thread has its own.
 
         Raises:
             DeviceError, KernelBuildError: as of a render.
             Stopped: the token was set.
-            NotReady: a look needs what is not there, and the executor does not wait.
+            NotReady: a preview needs what is not there, and the executor does not wait.
         """
-        look = Look(self._device, Cancellable(executor or self._executor, token))
+        preview = Preview(self._device, Cancellable(executor or self._executor, token))
         if exposed_in is not None and isinstance(scene.output.exposure, str):
             known = self._exposed
             if known is None or not (moving or known[0] is exposed_in or known[0] == exposed_in):
-                known = self._exposed = (exposed_in, measured_exposure(exposed_in, look))
+                known = self._exposed = (exposed_in, measured_exposure(exposed_in, preview))
             scene = with_exposure(scene, known[1])
         if is_settled(scene):
             return scene
@@ -99,9 +99,9 @@ class Fits:
         if moving and self._last is not None:
             return _carried(self._last[1], scene)
         try:
-            found = settled(scene, look)
+            found = settled(scene, preview)
         except SceneError:
-            return settled(_unfitted(scene), look)
+            return settled(_unfitted(scene), preview)
         self._last = (scene, found)
         return found
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 import time
+import warnings
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
@@ -23,7 +24,7 @@ from clfractal.work.run import Executor, ProgressCallback, run
 
 if TYPE_CHECKING:
     from clfractal.pictures.film import Film
-    from clfractal.work.look import Look
+    from clfractal.work.preview import Preview
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
@@ -43,8 +44,8 @@ class AnyEngine(ABC):
     def __init__(self) -> None:
         self._busy = threading.Lock()
         self._closed = False
-        self.looks_built_ms = 0.0
-        """Building programs for the quick looks of the last `prepare`, milliseconds."""
+        self.previews_built_ms = 0.0
+        """Building programs for the previews of the last `prepare`, milliseconds."""
 
     def __enter__(self) -> Self:
         return self
@@ -60,8 +61,14 @@ class AnyEngine(ABC):
 
     @property
     @abstractmethod
-    def look(self) -> Look:
-        """Quick looks at a scene."""
+    def preview(self) -> Preview:
+        """Previews of a scene."""
+
+    @property
+    def look(self) -> Preview:
+        """The former name of `preview`."""
+        warnings.warn("Engine.look is Engine.preview", DeprecationWarning, stacklevel=2)
+        return self.preview
 
     @abstractmethod
     def settled(self, scene: SceneLike) -> Scene:
@@ -86,7 +93,7 @@ class AnyEngine(ABC):
 
         Raises:
             SceneError, FormulaError: the scene or a setting is wrong, or there is nothing to fit to.
-            DeviceError, KernelBuildError: the quick look that this takes failed.
+            DeviceError, KernelBuildError: the preview that this takes failed.
             FileError: the picture is to be denoised, and the package for it is not installed.
         """
         asked: dict[str, Any] = {"precision": precision, "samples": samples, "region": region}
@@ -184,7 +191,7 @@ class AnyEngine(ABC):
             )
         films = JobFilms(job)
         state = run(job, films.films, self.executor, progress=progress, token=token)
-        return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
+        return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
 
     def render_pair(
         self,
@@ -217,7 +224,7 @@ class AnyEngine(ABC):
             )
             films = JobFilms(job)
             state = run(job, films.films, self.executor, progress=progress, token=token)
-            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.looks_built_ms))
+            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
             return eyes["left"], eyes["right"]
 
     @contextmanager

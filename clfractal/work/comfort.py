@@ -21,7 +21,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo, StereoPlane
 from clfractal.work.job import Job
-from clfractal.work.look import Look, points_of_depth
+from clfractal.work.preview import Preview, points_of_depth
 
 Floats = npt.NDArray[np.float64]
 Ends = tuple[float, float]
@@ -32,9 +32,9 @@ SIDES: tuple[EyeName, ...] = ("left", "right")
 LIMIT_DEGREES = 1.0
 """Parallax past which the viewer is warned."""
 
-# For pictures larger than this, depth is measured by a quick look instead of reading all pixels again.
+# For pictures larger than this, depth is measured by a preview instead of reading all pixels again.
 _MOST_PIXELS = 1 << 24
-# The quick look misses the finest spikes, so depth is fitted to this part of the budget.
+# The preview misses the finest spikes, so depth is fitted to this part of the budget.
 _MARGIN = 0.95
 # An angle with a large but finite tangent; no viewer's eyes turn so far.
 _NEARLY_RIGHT = np.radians(89.9)
@@ -118,8 +118,8 @@ def comfort_of_depth(
     return comfort_of(scene, view.origin + np.array([[nearest], [farthest]]) * view.axis, eye)
 
 
-def measured(scene: Scene, look: Look) -> Comfort | None:
-    """The range of parallax in a stereo scene's picture, by a quick look from each eye; None if the picture is empty.
+def measured(scene: Scene, preview: Preview) -> Comfort | None:
+    """The range of parallax in a stereo scene's picture, by a preview from each eye; None if the picture is empty.
 
     Raises:
         DeviceError, KernelBuildError: as of a render.
@@ -130,14 +130,14 @@ def measured(scene: Scene, look: Look) -> Comfort | None:
             if isinstance(view.renderer, CutPlaneRenderer):
                 found.append(Comfort(0.0, 0.0, 0.0, 0.0))
                 continue
-            points = look.points(view, eye)
+            points = preview.points(view, eye)
             if len(points):
                 found.append(comfort_of(view, points, eye))
     return Comfort.joined(found)
 
 
-def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort | None:
-    """The range of parallax in a finished job: from all pixels if it has the depth channel, else by quick looks.
+def comfort_of_job(job: Job, stores: Sequence[Picture], preview: Preview) -> Comfort | None:
+    """The range of parallax in a finished job: from all pixels if it has the depth channel, else by previews.
 
     None without stereo, and for an empty picture.
 
@@ -145,15 +145,15 @@ def comfort_of_job(job: Job, stores: Sequence[Picture], look: Look) -> Comfort |
         stores: of the job's views.
 
     Raises:
-        DeviceError, KernelBuildError: a look failed.
+        DeviceError, KernelBuildError: a preview failed.
     """
     if job.scene.stereo is None:
         return None
-    return comfort_of_films(job, stores) if _has_depth(job) else measured(job.scene, look)
+    return comfort_of_films(job, stores) if _has_depth(job) else measured(job.scene, preview)
 
 
 def comfort_of_films(job: Job, stores: Sequence[Picture]) -> Comfort | None:
-    """The same without a look: None also for pictures that lack the depth channel."""
+    """The same without a preview: None also for pictures that lack the depth channel."""
     if job.scene.stereo is None or not _has_depth(job):
         return None
     found = []
@@ -176,7 +176,7 @@ def _has_depth(job: Job) -> bool:
     )
 
 
-def fitted(scene: Scene, look: Look) -> Scene:
+def fitted(scene: Scene, preview: Preview) -> Scene:
     """The scene with a plane and a separation that keep its depth within `stereo.budget`; unchanged without `fit`.
 
     The viewpoint between the two eyes stays, so its view does not change: the screen is placed so that the nearest and the
@@ -193,11 +193,11 @@ def fitted(scene: Scene, look: Look) -> Scene:
     current = _with(scene, fit=None)
     view = scene_view(current)
     # First from the depth that the middle eye sees, then from that of both eyes placed by it.
-    points = look.points(current)
+    points = preview.points(current)
     if not len(points):
         raise SceneError("auto finds nothing to fit to: the picture is empty", Where(path="stereo.fit"))
     current = _fitted_to(current, stereo, view, points)
-    more = [look.points(*seen_by(current, name)) for name in SIDES]
+    more = [preview.points(*seen_by(current, name)) for name in SIDES]
     return _fitted_to(current, stereo, view, np.concatenate([points, *more]))
 
 

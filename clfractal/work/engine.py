@@ -23,7 +23,7 @@ from clfractal.work.settle import is_settled, settled
 if TYPE_CHECKING:
     from clfractal.pictures.film import Film
     from clfractal.pictures.probe import Probe
-    from clfractal.work.look import Look
+    from clfractal.work.preview import Preview
     from clfractal.work.refine import Refinement
     from clfractal.work.several import SeveralExecutor
 
@@ -69,8 +69,8 @@ class Engine(AnyEngine):
             from clfractal.work.several import SeveralExecutor
 
             self.executor = SeveralExecutor.on(devices, budget_seconds=budget_seconds, tell=tell)
-        # Separate executors for looks: their size differs, so they would replace a picture's buffers.
-        self._looking: dict[int, LocalExecutor] = {}
+        # Separate executors for previews: their size differs, so they would replace a picture's buffers.
+        self._previewing: dict[int, LocalExecutor] = {}
         self._budget_seconds = budget_seconds
         super().__init__()
 
@@ -84,8 +84,8 @@ class Engine(AnyEngine):
             self.executor.close()
             own = self.executor
             for executor in [own] if isinstance(own, LocalExecutor) else own.answering:
-                if id(executor) in self._looking:
-                    self._looking[id(executor)].close()
+                if id(executor) in self._previewing:
+                    self._previewing[id(executor)].close()
             self._closed = True
 
     @property
@@ -94,17 +94,17 @@ class Engine(AnyEngine):
         return self._first.device
 
     @property
-    def look(self) -> Look:
-        """Quick looks at a scene, on the engine's device."""
-        from clfractal.work.look import Look
+    def preview(self) -> Preview:
+        """Previews of a scene, on the engine's device."""
+        from clfractal.work.preview import Preview
 
         first = self._first
-        looking = self._looking.get(id(first))
-        if looking is None:
-            looking = LocalExecutor(first.device, budget_seconds=self._budget_seconds, tell=self.tell)
-            looking.kept = first.kept
-            self._looking[id(first)] = looking
-        return Look(first.device, looking)
+        executor = self._previewing.get(id(first))
+        if executor is None:
+            executor = LocalExecutor(first.device, budget_seconds=self._budget_seconds, tell=self.tell)
+            executor.kept = first.kept
+            self._previewing[id(first)] = executor
+        return Preview(first.device, executor)
 
     @property
     def _first(self) -> LocalExecutor:
@@ -124,7 +124,7 @@ class Engine(AnyEngine):
         """
         with self._alone():
             loaded = as_scene(scene)
-            return self._by_any_device(lambda: settled(loaded, self.look))
+            return self._by_any_device(lambda: settled(loaded, self.preview))
 
     def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
         loaded = as_scene(scene)
@@ -145,8 +145,8 @@ class Engine(AnyEngine):
         # Made first, so that mistakes are reported before anything is rendered.
         job = decide(scene)
         if not is_settled(scene):
-            job = decide(settled(scene, self.look))
-        self.looks_built_ms = device.loaded.building.milliseconds - built_before
+            job = decide(settled(scene, self.preview))
+        self.previews_built_ms = device.loaded.building.milliseconds - built_before
         return job if isinstance(self.executor, LocalExecutor) else self.executor.shared(job, device)
 
     def _by_any_device(self, work: Callable[[], T]) -> T:
@@ -175,7 +175,7 @@ class Engine(AnyEngine):
 
         with self._alone():
             job = self.prepare(scene, precision=precision)
-            return probed(job, *checked_pixel(x, y, job.region), self.look)
+            return probed(job, *checked_pixel(x, y, job.region), self.preview)
 
     def refine(
         self,
@@ -212,7 +212,7 @@ class Engine(AnyEngine):
                     channels=channels,
                     quality=quality,
                 )
-                yield from refined(job, self.executor, token, looks_built_ms=self.looks_built_ms)
+                yield from refined(job, self.executor, token, previews_built_ms=self.previews_built_ms)
 
         return Refinement(films())
 

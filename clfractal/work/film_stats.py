@@ -60,7 +60,9 @@ class FilmStats:
             }
         )
 
-    def values(self, *, wall_ms: float, films_ms: float = 0.0, looks_built_ms: float = 0.0) -> dict[str, Any]:
+    def values(
+        self, *, wall_ms: float, films_ms: float = 0.0, previews_built_ms: float = 0.0
+    ) -> dict[str, Any]:
         """The keys of `stats.statistics` but `stereo`, whose view moves, then `frames_kept` and `frames`, as plain data.
 
         At least one frame was counted. What may differ from frame to frame is that of the first frame that was rendered;
@@ -69,7 +71,7 @@ class FilmStats:
         Args:
             wall_ms: from the start of the command to its last file.
             films_ms: the part of it for writing films of the frames.
-            looks_built_ms: building programs for quick looks.
+            previews_built_ms: building programs for previews.
         """
         assert self._job is not None
         found = statistics(
@@ -77,7 +79,7 @@ class FilmStats:
             self._sum,
             wall_ms=wall_ms,
             write_ms=self._write_ms + films_ms,
-            looks_built_ms=looks_built_ms,
+            previews_built_ms=previews_built_ms,
             remarks=list(self._remarks),
         )
         found.pop("stereo", None)

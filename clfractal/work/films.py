@@ -21,11 +21,11 @@ from clfractal.work.stats import statistics
 
 @dataclass(frozen=True, slots=True)
 class Took:
-    """What a render took: its counts, the time of the whole call, and of building programs for looks before it, in ms."""
+    """What a render took: its counts, the time of the whole call, and of building previews' programs before it, in ms."""
 
     state: Progress
     wall_ms: float
-    looks_built_ms: float = 0.0
+    previews_built_ms: float = 0.0
 
 
 class JobFilms:
@@ -84,7 +84,7 @@ class JobFilms:
             self.job,
             took.state,
             wall_ms=took.wall_ms,
-            looks_built_ms=took.looks_built_ms,
+            previews_built_ms=took.previews_built_ms,
             comfort=comfort,
             remarks=remarks,
         )

@@ -61,7 +61,7 @@ class FilmScenes:
 
         Raises:
             SceneError, FormulaError: a value is out of its range then; at its track.
-            DeviceError, KernelBuildError: the quick look failed that frame 0 needs.
+            DeviceError, KernelBuildError: the preview failed that frame 0 needs.
         """
         found = self.movement.scene(number)
         if not isinstance(found.output.exposure, str):

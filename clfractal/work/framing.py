@@ -1,4 +1,4 @@
-"""A first scene of a formula: iterations, a camera that sees all of it, and colours, by small looks."""
+"""A first scene of a formula: iterations, a camera that sees all of it, and colours, by small previews."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES
 from clfractal.work.engine import Engine
-from clfractal.work.look import points_of_depth
+from clfractal.work.preview import points_of_depth
 
 Floats = npt.NDArray[np.float64]
 
@@ -30,9 +30,9 @@ FOV_INSIDE = 60.0
 SIZE = (1280, 720)
 """Pixels of the finished picture."""
 
-# Pixels of a look, which has the proportions of the picture.
+# Pixels of a preview, which has the proportions of the picture.
 _LOOK = (192, 108)
-# The forms of a body tell how to frame it, not what is finer than a pixel of a look.
+# The forms of a body tell how to frame it, not what is finer than a pixel of a preview.
 _SOFTER = 3.67
 # From where the set is looked at: azimuth and elevation, degrees.
 _PLACES = ((35, 25), (-40, 20), (10, 35), (75, 15), (150, 30), (-100, 30), (25, 60))
@@ -129,7 +129,7 @@ def framed(formula: Mapping[str, Any], folder: Path, engine: Engine, *, name: st
 
     Raises:
         SceneError, FormulaError, FileError: the formula is wrong, or nothing of it is seen.
-        DeviceError, KernelBuildError: a look failed.
+        DeviceError, KernelBuildError: a preview failed.
     """
     finder = _Finder(formula, folder, engine)
     around = finder.around(*_PLACES[0])
@@ -172,7 +172,7 @@ class _Finder:
         self.center, self.radius = start.bounds
 
     def scene(self, iterations: int, camera: Mapping[str, Any], **sections: Any) -> Scene:
-        """A scene of the size of a look."""
+        """A scene of the size of a preview."""
         data = {
             "version": 1,
             "formula": {**self.formula, "iterations": iterations},
@@ -182,14 +182,14 @@ class _Finder:
         }
         return load_scene(data, folder=self.folder)
 
-    def look(self, scene: Scene, *channels: str) -> Film:
+    def preview(self, scene: Scene, *channels: str) -> Film:
         return self.engine.render(scene, samples=1, channels=channels)
 
     def iterations(self, camera: Mapping[str, Any]) -> int:
         """The most applications of those that are tried that leave a form: neither noise nor dust."""
         found = _COUNTS[0]
         for count in _COUNTS:
-            film = self.look(self.scene(count, camera), *_NORMALS)
+            film = self.preview(self.scene(count, camera), *_NORMALS)
             if (film["A"] > 0.5).mean() < _LEAST_COVERED or _roughness(film) > _ROUGHEST:
                 break
             found = count
@@ -226,7 +226,7 @@ class _Finder:
     def _has_room(self, iterations: int, camera: Mapping[str, Any]) -> bool:
         """Whether a camera is outside the set, and not right before it."""
         scene = self.scene(iterations, camera)
-        film = self.look(scene, "Z", "A")
+        film = self.preview(scene, "Z", "A")
         depth = film["Z"][film["A"] > 0.5] / self.radius
         if inside_solid(scene, [scene.camera.position])[0] or len(depth) < 0.3 * film["A"].size:
             return False
@@ -234,7 +234,7 @@ class _Finder:
         return bool(near > _NEAREST and middle > _MIDDLE)
 
     def _points(self, scene: Scene) -> Floats:
-        film = self.look(scene, "Z")
+        film = self.preview(scene, "Z")
         return points_of_depth(scene_view(scene), film["Z"], film.display)
 
     def cameras(self, iterations: int) -> Iterator[dict[str, Any]]:
@@ -255,7 +255,7 @@ class _Finder:
         """How much there is to see: light and shade, and how much of the picture the set covers."""
         scene = self.scene(iterations, camera)
         warm = {"direction": list(_lights(scene)[0])}
-        film = self.look(self.scene(iterations, camera, lights=[warm]), "R", "G", "B", "A")
+        film = self.preview(self.scene(iterations, camera, lights=[warm]), "R", "G", "B", "A")
         covered = film["A"] > 0.5
         if covered.mean() < 0.02:
             return 0.0
@@ -272,7 +272,7 @@ class _Finder:
             "material": {"ambient": 1, "diffuse": 0, "specular": 0},
             "coloring": {"by": "trap", "palette": ["#000", "#fff"], "scale": 1 / widest, "repeat": False},
         }
-        film = self.look(self.scene(iterations, camera, **flat), "R", "A")
+        film = self.preview(self.scene(iterations, camera, **flat), "R", "A")
         values = film["R"][film["A"] > 0.5] * widest
         low, high = np.percentile(values, (3, 97))
         scale = 1 / max(high - low, 1e-3 * widest)
@@ -286,7 +286,7 @@ class _Finder:
             for name, section in found.sections().items()
             if name not in ("camera", "image", "renderer")
         }
-        film = self.look(self.scene(found.iterations, camera, **sections), "R", "G", "B", "A")
+        film = self.preview(self.scene(found.iterations, camera, **sections), "R", "G", "B", "A")
         light = np.asarray(film, np.float64)[film["A"] > 0.5] @ np.array([0.2126, 0.7152, 0.0722])
         lightest = float(np.percentile(light, 97)) if len(light) else 0.0
         stops = math.log2(_BRIGHT / lightest) if lightest > 0 else 0.0

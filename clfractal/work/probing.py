@@ -14,7 +14,7 @@ from clfractal.pictures.probe import CHANNELS, Probe, probe_of
 from clfractal.pictures.tiles import Region
 from clfractal.work.job import Identity, Job, Paste, StereoPair
 from clfractal.work.local import LocalExecutor
-from clfractal.work.look import Look
+from clfractal.work.preview import Preview
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ def place_at(job: Job, x: int, y: int, side: Side | None = None) -> Place | None
     return None
 
 
-def probed(job: Job, x: int, y: int, look: Look, side: Side | None = None) -> Probe:
+def probed(job: Job, x: int, y: int, preview: Preview, side: Side | None = None) -> Probe:
     """What lies at a pixel of a job's picture, by one ray through its middle.
 
     Raises:
@@ -61,7 +61,7 @@ def probed(job: Job, x: int, y: int, look: Look, side: Side | None = None) -> Pr
     """
     place = _shown_place(job, x, y, side)
     view = job.views[place.view]
-    values = look.pixel(job, view, place.x, place.y)
+    values = preview.pixel(job, view, place.x, place.y)
     return probe_of(values, view.camera, x=x, y=y, view=_number(job, place), eye=place.eye)
 
 
@@ -94,7 +94,7 @@ class FilmProber:
         column, row = checked_pixel(x, y, film.region)
         if not set(CHANNELS) <= set(film.channels):
             device = by_key(self.job.device.index, self.job.device.key)
-            return probed(self.job, column, row, Look(device, LocalExecutor(device)), self.side)
+            return probed(self.job, column, row, Preview(device, LocalExecutor(device)), self.side)
         place = _shown_place(self.job, column, row, self.side)
         at = row - film.region.y, column - film.region.x
         values = {name: float(film[name][at]) for name in CHANNELS}

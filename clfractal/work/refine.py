@@ -57,12 +57,12 @@ def refined(
     executor: LocalExecutor | SeveralExecutor,
     token: CancelToken | None = None,
     *,
-    looks_built_ms: float = 0.0,
+    previews_built_ms: float = 0.0,
 ) -> Generator[Film]:
     """The passes of a job, each as a film of the whole picture. The last one has the same bits as `run`.
 
     Args:
-        looks_built_ms: for the films' statistics, see `Took`.
+        previews_built_ms: for the films' statistics, see `Took`.
 
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
@@ -81,7 +81,7 @@ def refined(
         return replace(state, **asdict(total), views=[replace(each) for each in of_views])
 
     def shown(films: JobFilms, state: Progress, stage: str) -> Film:
-        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start), looks_built_ms))
+        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start), previews_built_ms))
         film.tell("seconds", seconds)
         film.stage = stage
         return film

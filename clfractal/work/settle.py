@@ -1,6 +1,6 @@
 """Measures what a scene leaves open before it is rendered: a pair's fit, focus and exposure.
 
-Each is measured by a quick look at the whole picture and replaced by what was found. So a region, either eye, a resumed
+Each is measured by a preview at the whole picture and replaced by what was found. So a region, either eye, a resumed
 picture, and the scene in a picture's header all have the same numbers.
 """
 
@@ -20,7 +20,7 @@ from clfractal.scene.stereo import Eye
 
 if TYPE_CHECKING:
     from clfractal.pictures.film import Film
-    from clfractal.work.look import Look
+    from clfractal.work.preview import Preview
 
 Floats = npt.NDArray[np.float64]
 Camera = PerspectiveCamera | OrthographicCamera
@@ -46,7 +46,7 @@ def is_settled(scene: Scene) -> bool:
     return not any(_wants_focus(camera) for camera in (scene.camera, *own))
 
 
-def settled(scene: Scene, look: Look) -> Scene:
+def settled(scene: Scene, preview: Preview) -> Scene:
     """The scene with numbers in the place of what is to be measured; the same scene if that is nothing.
 
     Raises:
@@ -57,10 +57,10 @@ def settled(scene: Scene, look: Look) -> Scene:
         return scene
     from clfractal.work.comfort import fitted
 
-    return exposed(focused(fitted(scene, look), look), look)
+    return exposed(focused(fitted(scene, preview), preview), preview)
 
 
-def focused(scene: Scene, look: Look) -> Scene:
+def focused(scene: Scene, preview: Preview) -> Scene:
     """The scene with a `focus_distance` for each camera that asks for one.
 
     A camera that several views of a layout share is focused in the first of them. In an empty picture the default distance
@@ -70,19 +70,19 @@ def focused(scene: Scene, look: Look) -> Scene:
         DeviceError, KernelBuildError: as of a render.
     """
     if scene.layout is None:
-        return scene.model_copy(update=_focused(scene.camera, _middle_views(scene)[:1], look))
+        return scene.model_copy(update=_focused(scene.camera, _middle_views(scene)[:1], preview))
     shared, changed = [], []
     for own, (view, eye) in zip(scene.layout.views, _middle_views(scene), strict=True):
         if own.camera is None:
             shared.append((view, eye))
             changed.append(own)
         else:
-            changed.append(own.model_copy(update=_focused(own.camera, [(view, eye)], look)))
+            changed.append(own.model_copy(update=_focused(own.camera, [(view, eye)], preview)))
     layout = scene.layout.model_copy(update={"views": tuple(changed)})
-    return scene.model_copy(update={**_focused(scene.camera, shared, look), "layout": layout})
+    return scene.model_copy(update={**_focused(scene.camera, shared, preview), "layout": layout})
 
 
-def exposed(scene: Scene, look: Look) -> Scene:
+def exposed(scene: Scene, preview: Preview) -> Scene:
     """The scene with a number for `output.exposure: auto`; unchanged without.
 
     The brightest hundredth of what is seen comes near white. Where that would leave all the rest in the dark, the rest is
@@ -93,7 +93,7 @@ def exposed(scene: Scene, look: Look) -> Scene:
     """
     if not isinstance(scene.output.exposure, str):
         return scene
-    seen = [look.film(view, eye) for view, eye in _middle_views(scene)]
+    seen = [preview.film(view, eye) for view, eye in _middle_views(scene)]
     output = scene.output.model_copy(update={"exposure": exposure_of(seen)})
     return scene.model_copy(update={"output": output})
 
@@ -132,7 +132,7 @@ def _wants_focus(camera: Camera | None) -> bool:
     )
 
 
-def _focused(camera: Camera, views: Sequence[tuple[Scene, Eye]], look: Look) -> dict[str, Camera]:
+def _focused(camera: Camera, views: Sequence[tuple[Scene, Eye]], preview: Preview) -> dict[str, Camera]:
     """The camera of some views as a change of what holds it; empty if there is nothing to measure, or nothing is seen."""
     if not isinstance(camera, PerspectiveCamera) or not _wants_focus(camera):
         return {}
@@ -140,7 +140,7 @@ def _focused(camera: Camera, views: Sequence[tuple[Scene, Eye]], look: Look) -> 
     for view, eye in views:
         if isinstance(view.renderer, CutPlaneRenderer):
             continue
-        depth = look.depth(view, camera.measured_focus, eye)
+        depth = preview.depth(view, camera.measured_focus, eye)
         if depth is not None and depth <= _FARTHEST:
             measured = {"focus": None, "focus_on": None, "focus_distance": float(f"{depth:.9g}")}
             return {"camera": camera.model_copy(update=measured)}

@@ -25,7 +25,7 @@ def statistics(
     *,
     wall_ms: float,
     write_ms: float = 0.0,
-    looks_built_ms: float = 0.0,
+    previews_built_ms: float = 0.0,
     comfort: Comfort | None = None,
     remarks: Sequence[str] = (),
 ) -> dict[str, Any]:
@@ -37,7 +37,7 @@ def statistics(
     includes the steps of shadow rays.
 
     Args:
-        looks_built_ms: building programs for the quick looks before the render; a part of `build_ms`.
+        previews_built_ms: building programs for the previews before the render; a part of `build_ms`.
         comfort: the parallax of a stereo scene, where it is known.
         remarks: see `remarks.remarks_of`.
     """
@@ -54,7 +54,7 @@ def statistics(
         "height": region.height,
         "tiles": state.tiles,
         "tiles_resumed": state.tiles_before,
-        "build_ms": round(looks_built_ms + state.build_ms, 3),
+        "build_ms": round(previews_built_ms + state.build_ms, 3),
         "kernel_ms": round(state.kernel_ms, 3),
         "write_ms": round(write_ms, 3),
         "wall_ms": round(wall_ms, 3),

@@ -122,7 +122,7 @@ def test_both_eyes_have_the_focus_of_the_eye_between_them(engine: Engine) -> Non
     expected = wide * 0.7 / 0.6 - BALL_RADIUS  # the viewer sits where the screen wants it
     assert [view.camera.focus_distance for view in job.views] == pytest.approx([expected] * 2, abs=2e-3)
     seen, eye = seen_by(scene, "left")
-    assert engine.look.depth(seen, (0.5, 0.5), eye) != job.views[0].camera.focus_distance
+    assert engine.preview.depth(seen, (0.5, 0.5), eye) != job.views[0].camera.focus_distance
 
 
 def test_regions_and_headers_give_the_same_bits(engine: Engine) -> None:

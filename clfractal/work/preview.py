@@ -1,4 +1,4 @@
-"""Quick looks at a scene before it is rendered: small pictures with depth, and single pixels."""
+"""Previews of a scene before it is rendered: small pictures with depth, and single pixels."""
 
 from __future__ import annotations
 
@@ -24,15 +24,15 @@ from clfractal.work.run import Executor, run
 
 Floats = npt.NDArray[np.float64]
 
-# Largest width of a quick look, pixels.
+# Largest width of a preview, pixels.
 _SIDE = 320
 _CHANNELS = ("R", "G", "B", "A", "Z")
 # A lens that is open by so little blurs nothing, and needs no other program than the picture's.
 _CLOSED = 1e6
 
 
-class Look:
-    """Quick looks at a scene, by an executor on a device."""
+class Preview:
+    """Previews of a scene, by an executor on a device."""
 
     def __init__(self, device: Device, executor: Executor) -> None:
         self.device, self.executor = device, executor
@@ -57,8 +57,8 @@ class Look:
     def depth(self, scene: Scene, place: tuple[float, float], eye: Eye = MIDDLE) -> float | None:
         """The depth of what lies nearest to a place of the picture, along the view axis, scene units; None if it is empty.
 
-        The place itself is looked at as finely as the picture shows it. If nothing lies there, the nearest place of a quick
-        look counts.
+        The place itself is looked at as finely as the picture shows it. If nothing lies there, the nearest place of a
+        preview counts.
 
         Args:
             place: parts of the width and the height, from the top left.
