@@ -16,7 +16,7 @@ LONGEST_MEDIAN = 200
 LONGEST_KERNEL = 300
 # One place each for what is heavy or has peculiar habits.
 OWNERS = {
-    "yaml": {"files/document.py", "files/marks.py"},
+    "yaml": {"files/document.py", "files/spans.py"},
     "OpenEXR": {"files/exr.py"},
     "png": {"files/png.py"},
     "rich": {"commands/progress.py"},
@@ -36,7 +36,6 @@ OWNERS = {
     "skimage": {"voxels/mesh.py"},
     "glfw": {"viewer/window.py", "commands/view.py"},
     "OpenGL": {"viewer/gl.py", "commands/view.py"},
-    "ruamel": {"files/spans.py", "commands/view.py"},
 }
 
 
@@ -110,7 +109,7 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
             "clfractal.work.refine",
         ),
     }
-    foreign = {"OpenEXR", "PIL", "cmap", "mpmath", "rich", "ruamel", "ssl", "xml", "http"}
+    foreign = {"OpenEXR", "PIL", "cmap", "mpmath", "rich", "ssl", "xml", "http"}
     assert loaded & (own | foreign) == set()
 
 

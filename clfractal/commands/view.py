@@ -40,7 +40,6 @@ def view(options: Options, shell: Shell) -> None:
         import glfw  # noqa: F401
         import imgui_bundle  # noqa: F401
         import OpenGL  # noqa: F401
-        import ruamel.yaml  # noqa: F401
     except ImportError as error:
         raise DeviceError(f"{_EXTRA} (missing: {error.name})") from error
     from clfractal.viewer import window

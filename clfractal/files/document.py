@@ -24,7 +24,8 @@ __all__ = ["MAX_DEPTH", "MAX_NODES", "read_document", "read_text_file", "read_va
 MAX_NODES = 100_000
 MAX_NUMBER_LENGTH = 40
 
-_Parser = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+PARSER = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+"""What cuts a text into events."""
 _INT = re.compile(r"[-+]?[0-9]+")
 _OTHER_BASES = re.compile(r"0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(\.[0-9]+|[0-9]+(\.[0-9]*)?)([eE][-+]?[0-9]+)?")
@@ -170,7 +171,7 @@ class _Builder:
 
     def _events(self, text: str) -> Iterator[Any]:
         try:
-            yield from yaml.parse(text, Loader=_Parser)
+            yield from yaml.parse(text, Loader=PARSER)
         except yaml.reader.ReaderError as error:
             line = text.encode().count(b"\n", 0, error.position) + 1
             raise self.error("holds a character that YAML does not allow", Where(self.file, line)) from error

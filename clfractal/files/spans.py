@@ -6,8 +6,9 @@ import re
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from ruamel.yaml import YAML
-from ruamel.yaml.error import YAMLError
+import yaml
+
+from clfractal.files.document import PARSER
 
 _BLANK = re.compile(r"(?:[ \t\r\n]|(?<![^ \t\r\n])#[^\r\n]*)*")
 _PROPERTIES = re.compile(r"(?:[&!][^\s,\[\]{}]*\s+)*")
@@ -82,12 +83,9 @@ def parse(text: str) -> Mapping:
         UnusualError: the parser refuses the text, or it has keys or empty values that are written in a rare way.
     """
     try:
-        events = [
-            event
-            for event in YAML(typ="safe", pure=True).parse(text)
-            if hasattr(event, "anchor") or _ends(event)
-        ]
-    except (YAMLError, ValueError, AttributeError) as error:
+        parsed = yaml.parse(text, Loader=PARSER)
+        events = [event for event in parsed if isinstance(event, (yaml.NodeEvent, yaml.CollectionEndEvent))]
+    except (yaml.YAMLError, ValueError) as error:
         raise UnusualError(str(error)) from error
     root, _ = _node(text, events, 0)
     if not isinstance(root, Mapping):
@@ -102,24 +100,18 @@ def value_start(text: str, node: Node) -> int:
     )
 
 
-def _ends(event: Any) -> bool:
-    return type(event).__name__ in ("SequenceEndEvent", "MappingEndEvent")
-
-
 def _node(text: str, events: list[Any], at: int) -> tuple[Node, int]:
     """The node that begins with an event, and the index of the event after it."""
     event = events[at]
-    kind = type(event).__name__
-    start, end = event.start_mark.index, event.end_mark.index
-    if kind == "AliasEvent":
-        return Alias(start, end, event.anchor), at + 1
-    if kind == "ScalarEvent":
-        return _scalar(text, event), at + 1
-    if kind == "SequenceStartEvent":
-        return _sequence(text, events, at)
-    if kind == "MappingStartEvent":
-        return _mapping(text, events, at)
-    raise UnusualError(kind)
+    match type(event):
+        case yaml.AliasEvent:
+            return Alias(event.start_mark.index, event.end_mark.index, event.anchor), at + 1
+        case yaml.ScalarEvent:
+            return _scalar(text, event), at + 1
+        case yaml.SequenceStartEvent:
+            return _sequence(text, events, at)
+        case _:
+            return _mapping(text, events, at)
 
 
 def _scalar(text: str, event: Any) -> Scalar:
@@ -137,7 +129,7 @@ def _sequence(text: str, events: list[Any], at: int) -> tuple[Sequence, int]:
     found = Sequence(event.start_mark.index, event.end_mark.index, bool(event.flow_style), event.anchor)
     place = _after_properties(text, found.start)
     at += 1
-    while not _ends(events[at]):
+    while not isinstance(events[at], yaml.CollectionEndEvent):
         node, at = _node(text, events, at)
         if isinstance(node, Scalar) and node.start == node.end:
             raise UnusualError("an empty entry")
@@ -158,7 +150,7 @@ def _mapping(text: str, events: list[Any], at: int) -> tuple[Mapping, int]:
     if found.flow and text[_after_properties(text, found.start)] != "{":
         raise UnusualError("a pair without braces")
     at += 1
-    while not _ends(events[at]):
+    while not isinstance(events[at], yaml.CollectionEndEvent):
         key, at = _node(text, events, at)
         if not isinstance(key, Scalar) or key.start == key.end or text[: key.start].rstrip(" ").endswith("?"):
             raise UnusualError("an unusual key")

@@ -44,7 +44,7 @@ def needed(*programs: str) -> None:
         "xrandr": "x11-xserver-utils",
     }
     found = [name for name in programs if shutil.which(name) is None]
-    libraries = [name for name in ("glfw", "OpenGL", "imgui_bundle", "ruamel.yaml") if not _importable(name)]
+    libraries = [name for name in ("glfw", "OpenGL", "imgui_bundle") if not _importable(name)]
     told = [f"{name} (Debian: {packages.get(name, name)})" for name in found]
     missing(", ".join([*told, *(f"{name} (pip install 'clfractal[viewer]')" for name in libraries)]))
 

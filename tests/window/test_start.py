@@ -9,7 +9,7 @@ import pytest
 from tests.shell import SCENE, Ended, environment, process
 from tests.window.display import Display
 
-LIBRARIES = ("glfw", "OpenGL", "imgui_bundle", "ruamel.yaml")
+LIBRARIES = ("glfw", "OpenGL", "imgui_bundle")
 
 
 def view(display: Display | None, folder: Path, *arguments: str, **extra: str) -> Ended:
