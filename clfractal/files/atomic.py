@@ -116,6 +116,28 @@ def atomic_writer(path: str | Path) -> Iterator[Path]:
             beside.unlink(missing_ok=True)
 
 
+class ContentError(Exception):
+    """What is wrong with a file's content; `reading` adds its name."""
+
+
+@contextmanager
+def reading(path: str | Path) -> Iterator[BinaryIO]:
+    """A regular file that is open for reading, and whose name belongs to whatever goes wrong inside.
+
+    Raises:
+        FileError: it cannot be read, a ContentError inside, or its content does not fit into memory.
+    """
+    with open_regular(path) as stream:
+        try:
+            yield stream
+        except OSError as error:
+            raise file_error(path, "cannot be read", error) from error
+        except MemoryError as error:
+            raise file_error(path, "is too large: out of memory", "") from error
+        except ContentError as error:
+            raise file_error(path, str(error), "") from error.__cause__
+
+
 def open_regular(path: str | Path) -> BinaryIO:
     """Opens a regular file for reading; it does not wait for a pipe or read a device.
 

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FileError
-from clfractal.files.atomic import file_error, open_regular
+from clfractal.files.atomic import ContentError, reading
 from clfractal.files.exr_header import ExrHeader, read_header
 from clfractal.files.radiance import MAGIC, radiance_pixels, read_radiance_header
 
@@ -44,74 +43,67 @@ def read_environment(path: str | Path) -> Floats:
     Raises:
         FileError: it cannot be read, is neither kind of file or a damaged one, or no such map.
     """
-    with open_regular(path) as stream:
-        try:
-            begin = stream.read(len(MAGIC[0]))
-            rest = stream.read() if begin.startswith(MAGIC) else b""
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-    pixels = _of_radiance(path, begin + rest) if rest else _of_exr(path)
-    np.maximum(pixels, 0.0, out=pixels)
-    return pixels
+    with reading(path) as stream:
+        begin = stream.read(len(MAGIC[0]))
+        pixels = _of_radiance(begin + stream.read()) if begin.startswith(MAGIC) else _of_exr(path)
+        return np.maximum(pixels, 0.0, out=pixels)
 
 
 def _of_exr(path: str | Path) -> Floats:
     header = read_header(path)
-    _check_shape(path, header)
+    _check_shape(header)
     from clfractal.files.exr import read_exr
 
     planes, values = read_exr(path, tiles=True)
     names = "RGB" if set("RGB") <= set(planes) else "YYY"
     pixels = np.stack([np.asarray(planes[name], np.float32) for name in names], axis=-1)
     del planes
-    _check_numbers(path, pixels)
+    _check_numbers(pixels)
     return _in_rec709(pixels, values.get("chromaticities")) if names == "RGB" else pixels
 
 
-def _of_radiance(path: str | Path, data: bytes) -> Floats:
-    header = read_radiance_header(path, data)
-    _check_size(path, *header.size)
-    pixels = radiance_pixels(path, data, header)
+def _of_radiance(data: bytes) -> Floats:
+    header = read_radiance_header(data)
+    _check_size(*header.size)
+    pixels = radiance_pixels(data, header)
     if header.is_xyz:
         pixels = np.ascontiguousarray(pixels @ np.linalg.inv(_to_xyz(_REC709)).T.astype(np.float32))
-    _check_numbers(path, pixels)
+    _check_numbers(pixels)
     return pixels if header.is_xyz else _in_rec709(pixels, header.primaries)
 
 
-def _check_shape(path: str | Path, header: ExrHeader) -> None:
+def _check_shape(header: ExrHeader) -> None:
     """Checks everything in the header before any pixel is read."""
     window = header.values().get("dataWindow")
     envmap = header.attributes.get("envmap")
     if not isinstance(window, tuple) or len(window) != 4 or not header.channels:
-        raise file_error(path, "is damaged: its header lacks required attributes", "")
+        raise ContentError("is damaged: its header lacks required attributes")
     width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
     if envmap is not None and envmap.data == _CUBE:
-        raise file_error(path, "is a cube map; an environment is a latitude-longitude map", "")
-    _check_size(path, width, height)
+        raise ContentError("is a cube map; an environment is a latitude-longitude map")
+    _check_size(width, height)
     whole = header.values().get("displayWindow")
     if whole != window and isinstance(whole, tuple) and len(whole) == 4:
         shown = f"{width} x {height} of {whole[2] - whole[0] + 1} x {whole[3] - whole[1] + 1} pixels"
-        raise file_error(path, f"holds only a part of its picture, or more than it: {shown}", "")
+        raise ContentError(f"holds only a part of its picture, or more than it: {shown}")
     if not set("RGB") <= set(header.channels) and "Y" not in header.channels:
         found = ", ".join(header.channels[:10])
-        raise file_error(path, f"must have the channels R, G and B, or Y; it has {found[:200]}", "")
+        raise ContentError(f"must have the channels R, G and B, or Y; it has {found[:200]}")
     if 4 * width * height * len(header.channels) > _MOST_BYTES:
-        raise file_error(
-            path, f"is too large: {len(header.channels)} channels of {width} x {height} pixels", ""
-        )
+        raise ContentError(f"is too large: {len(header.channels)} channels of {width} x {height} pixels")
 
 
-def _check_size(path: str | Path, width: int, height: int) -> None:
+def _check_size(width: int, height: int) -> None:
     if width < 1 or width != 2 * height:
         message = (
             f"must be twice as wide as high, as latitude-longitude maps are, got {width} x {height} pixels"
         )
-        raise file_error(path, message, "")
+        raise ContentError(message)
     if width > MAX_WIDTH:
-        raise file_error(path, f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}", "")
+        raise ContentError(f"is too large: {width:,} pixels wide, at most {MAX_WIDTH:,}")
 
 
-def _check_numbers(path: str | Path, pixels: Floats) -> None:
+def _check_numbers(pixels: Floats) -> None:
     """Refuses numbers that cannot be light: an error here is better than spots in a picture."""
     # Both results are NaN if any number is.
     limits = pixels.min(initial=0.0), pixels.max(initial=0.0)
@@ -128,7 +120,7 @@ def _check_numbers(path: str | Path, pixels: Floats) -> None:
             row, column = divmod(int(found.argmax()), found.shape[1])
             pixel = "pixel" if count == 1 else "pixels"
             place = f"the first in column {column}, row {row} (counted from 0 at the top left)"
-            raise FileError(f"has {count:,} {pixel} {what}, {place}", file_error(path, "", "").where)
+            raise ContentError(f"has {count:,} {pixel} {what}, {place}")
 
 
 def _in_rec709(pixels: Floats, given: object) -> Floats:

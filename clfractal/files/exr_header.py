@@ -15,7 +15,7 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from clfractal.files.atomic import file_error, open_regular
+from clfractal.files.atomic import ContentError, file_error, reading
 
 MAGIC = b"\x76\x2f\x31\x01"
 SCENE_ATTRIBUTE = "clfractal"
@@ -102,25 +102,16 @@ def _texts(data: bytes) -> tuple[str, ...]:
     return tuple(found)
 
 
-class _DamagedError(Exception):
-    """Why a file is not a whole OpenEXR file."""
-
-
 def read_header(path: str | Path) -> ExrHeader:
     """The header of an OpenEXR file; for one-part scanline files it also checks that the pixel data are complete.
 
     Raises:
         FileError: it cannot be read, is no OpenEXR file, or is damaged or cut short.
     """
-    with open_regular(path) as stream:
-        try:
-            header = _parse(stream)
-            if header.one_part_scanlines:
-                _check_whole(stream, header)
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-        except _DamagedError as damage:
-            raise file_error(path, str(damage), "") from None
+    with reading(path) as stream:
+        header = _parse(stream)
+        if header.one_part_scanlines:
+            _check_whole(stream, header)
         return header
 
 
@@ -142,7 +133,7 @@ def read_scene_text(path: str | Path) -> str | None:
 def _exactly(stream: BinaryIO, size: int) -> bytes:
     data = stream.read(size)
     if len(data) < size:
-        raise _DamagedError("is cut short: the file ends inside its header")
+        raise ContentError("is cut short: the file ends inside its header")
     return data
 
 
@@ -153,7 +144,7 @@ def _name(stream: BinaryIO) -> str:
     name, zero, _ = piece.partition(b"\0")
     if not zero:
         cut = len(piece) <= _LONGEST_NAME
-        raise _DamagedError(
+        raise ContentError(
             "is cut short: the file ends inside its header" if cut else "is damaged: an endless name"
         )
     stream.seek(start + len(name) + 1)
@@ -163,10 +154,10 @@ def _name(stream: BinaryIO) -> str:
 def _parse(stream: BinaryIO) -> ExrHeader:
     size = os.fstat(stream.fileno()).st_size
     if stream.read(4) != MAGIC:
-        raise _DamagedError("is not an OpenEXR file")
+        raise ContentError("is not an OpenEXR file")
     (version,) = struct.unpack("<I", _exactly(stream, 4))
     if version & 0xFF != 2:
-        raise _DamagedError(f"is an OpenEXR file of version {version & 0xFF}; only version 2 is known")
+        raise ContentError(f"is an OpenEXR file of version {version & 0xFF}; only version 2 is known")
     attributes: dict[str, Attribute] = {}
     while True:
         offset = stream.tell()
@@ -176,7 +167,7 @@ def _parse(stream: BinaryIO) -> ExrHeader:
         kind = _name(stream)
         (length,) = struct.unpack("<i", _exactly(stream, 4))
         if not 0 <= length <= _LARGEST_ATTRIBUTE or len(attributes) >= _MOST_ATTRIBUTES:
-            raise _DamagedError("is damaged: its header is not valid")
+            raise ContentError("is damaged: its header is not valid")
         attributes[name] = Attribute(kind, _exactly(stream, length), offset)
 
 
@@ -189,11 +180,11 @@ def _channel_bytes(data: bytes) -> int:
             break
         kind, across, down = struct.unpack("<i4xii", rest[:16])
         if kind not in _PIXEL_BYTES or across != 1 or down != 1:
-            raise _DamagedError("is damaged, or has sub-sampled channels")
+            raise ContentError("is damaged, or has sub-sampled channels")
         total += _PIXEL_BYTES[kind]
         data = rest[16:]
     if data != b"\0" or not total:
-        raise _DamagedError("is damaged: its list of channels is not valid")
+        raise ContentError("is damaged: its list of channels is not valid")
     return total
 
 
@@ -204,16 +195,16 @@ def _check_whole(stream: BinaryIO, header: ExrHeader) -> None:
         (left, top, right, bottom), compression = values["dataWindow"], values["compression"]
         pixel_bytes = _channel_bytes(header.attributes["channels"].data)
     except (KeyError, TypeError, ValueError):
-        raise _DamagedError("is damaged: its header lacks required attributes") from None
+        raise ContentError("is damaged: its header lacks required attributes") from None
     width, height = right - left + 1, bottom - top + 1
     if width < 1 or height < 1 or compression not in _ROWS_PER_CHUNK:
-        raise _DamagedError("is damaged: its size or compression is impossible")
+        raise ContentError("is damaged: its size or compression is impossible")
     if compression <= 3 and width * height * pixel_bytes > _ZIP_AT_MOST * header.file_size:
-        raise _DamagedError("is cut short or damaged: it is too small for the picture it promises")
+        raise ContentError("is cut short or damaged: it is too small for the picture it promises")
     rows = _ROWS_PER_CHUNK[compression]
     count = (height + rows - 1) // rows
     table_end = header.end + 8 * count
-    cut_short = _DamagedError("is cut short: the file ends inside its pixels")
+    cut_short = ContentError("is cut short: the file ends inside its pixels")
     if table_end > header.file_size:
         raise cut_short
     stream.seek(header.end)

@@ -19,7 +19,7 @@ from typing import Any, BinaryIO, Literal, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.atomic import atomic_writer, file_error, open_regular
+from clfractal.files.atomic import ContentError, atomic_writer, file_error, reading
 from clfractal.files.png import SCENE_KEY
 from clfractal.files.srgb import Floats, codes
 
@@ -188,18 +188,13 @@ def read_texts(path: str | Path) -> dict[str, str]:
     Raises:
         FileError: it cannot be read, is no such file, or is damaged or cut short.
     """
-    with open_regular(path) as stream:
-        try:
-            start = stream.read(12)
-            if start[:3] == b"\xff\xd8\xff":
-                return _of_jpeg(stream)
-            if start[:4] == b"RIFF" and start[8:] == b"WEBP":
-                return _of_webp(stream, int.from_bytes(start[4:8], "little"))
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-        except _DamagedError as damage:
-            raise file_error(path, str(damage), "") from None
-    raise file_error(path, "is neither a JPEG nor a WebP file", "")
+    with reading(path) as stream:
+        start = stream.read(12)
+        if start[:3] == b"\xff\xd8\xff":
+            return _of_jpeg(stream)
+        if start[:4] == b"RIFF" and start[8:] == b"WEBP":
+            return _of_webp(stream, int.from_bytes(start[4:8], "little"))
+        raise ContentError("is neither a JPEG nor a WebP file")
 
 
 def read_scene_text(path: str | Path) -> str | None:
@@ -209,10 +204,6 @@ def read_scene_text(path: str | Path) -> str | None:
         FileError: as for `read_texts`.
     """
     return read_texts(path).get(SCENE_KEY)
-
-
-class _DamagedError(Exception):
-    """Why a file is not a whole picture."""
 
 
 _CUT_SHORT = "is cut short: the file ends inside its data"
@@ -225,13 +216,13 @@ def _of_jpeg(stream: BinaryIO) -> dict[str, str]:
     while True:
         head = stream.read(4)
         if len(head) < 4:
-            raise _DamagedError(_CUT_SHORT)
+            raise ContentError(_CUT_SHORT)
         marker, length = head[1], int.from_bytes(head[2:], "big")
         if head[0] != 0xFF or length < 2:
-            raise _DamagedError("is damaged: its segments are not valid")
+            raise ContentError("is damaged: its segments are not valid")
         data = stream.read(length - 2)
         if len(data) < length - 2:
-            raise _DamagedError(_CUT_SHORT)
+            raise ContentError(_CUT_SHORT)
         if marker == 0xE1 and data.startswith(_XMP):
             packet = data[len(_XMP) :]
         elif marker == 0xE1 and data.startswith(_XMP_MORE) and len(data) >= len(_XMP_MORE) + 40:
@@ -239,7 +230,7 @@ def _of_jpeg(stream: BinaryIO) -> dict[str, str]:
             more.setdefault(name, {})[int.from_bytes(rest[4:8], "big")] = rest[8:]
             total += len(rest)
             if total > _LARGEST_TEXT:
-                raise _DamagedError(f"is damaged: a text of more than {_LARGEST_TEXT:,} bytes")
+                raise ContentError(f"is damaged: a text of more than {_LARGEST_TEXT:,} bytes")
         if marker == 0xDA:  # the scan: what follows is pixels
             break
     # Within pixels 0xFF is followed by 0 or a restart's number, so these two bytes are the picture's end.
@@ -249,20 +240,20 @@ def _of_jpeg(stream: BinaryIO) -> dict[str, str]:
             break
         before = piece[-1:]
     else:
-        raise _DamagedError(_CUT_SHORT)
+        raise ContentError(_CUT_SHORT)
     properties = _properties(packet)
     name = properties.get(_MORE, "").encode()
     parts = more.get(name, {})
     whole = b"".join(parts[place] for place in sorted(parts))
     if name and hashlib.md5(whole, usedforsecurity=False).hexdigest().upper().encode() != name:
-        raise _DamagedError("is damaged: wrong check sum of its scene")
+        raise ContentError("is damaged: wrong check sum of its scene")
     return _by_keyword({**_properties(whole), **properties})
 
 
 def _of_webp(stream: BinaryIO, length: int) -> dict[str, str]:
     size = os.fstat(stream.fileno()).st_size
     if length + 8 > size:
-        raise _DamagedError(_CUT_SHORT)
+        raise ContentError(_CUT_SHORT)
     place, end = 12, length + 8
     texts: dict[str, str] = {}
     while place + 8 <= end:
@@ -270,10 +261,10 @@ def _of_webp(stream: BinaryIO, length: int) -> dict[str, str]:
         head = stream.read(8)
         inside = int.from_bytes(head[4:], "little")
         if place + 8 + inside > end:
-            raise _DamagedError("is damaged: its chunks are not valid")
+            raise ContentError("is damaged: its chunks are not valid")
         if head[:4] == b"XMP ":
             if inside > _LARGEST_TEXT:
-                raise _DamagedError(f"is damaged: a text of {inside:,} bytes")
+                raise ContentError(f"is damaged: a text of {inside:,} bytes")
             texts = _by_keyword(_properties(stream.read(inside)))
         place += 8 + inside + inside % 2
     return texts

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import png
 
-from clfractal.files.atomic import atomic_writer, file_error, open_regular
+from clfractal.files.atomic import ContentError, atomic_writer, reading
 from clfractal.files.srgb import Bits, codes
 
 Floats = npt.NDArray[np.float32]
@@ -96,14 +96,14 @@ def read_png_pixels(path: str | Path) -> npt.NDArray[np.uint8]:
     Raises:
         FileError: it cannot be read, is no PNG file, or is damaged or cut short.
     """
-    with open_regular(path) as stream:
+    with reading(path) as stream:
         try:
             width, height, rows, _ = png.Reader(file=stream).asRGB8()
             # Row by row: the size that a damaged header claims takes no memory.
             found = np.frombuffer(b"".join(bytes(row) for row in rows), np.uint8)
             return found.reshape(height, width, 3)
-        except (OSError, ValueError, EOFError, zlib.error, png.Error) as error:
-            raise file_error(path, "cannot be read", error) from error
+        except (ValueError, EOFError, zlib.error, png.Error) as error:
+            raise ContentError(f"cannot be read: {error}") from error
 
 
 def stream_png(
@@ -150,13 +150,8 @@ def read_texts(path: str | Path) -> dict[str, str]:
     Raises:
         FileError: it cannot be read, is no PNG file, or is damaged or cut short.
     """
-    with open_regular(path) as stream:
-        try:
-            return _read_texts(stream)
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-        except _DamagedError as damage:
-            raise file_error(path, str(damage), "") from None
+    with reading(path) as stream:
+        return _read_texts(stream)
 
 
 def read_form(path: str | Path) -> tuple[int, int]:
@@ -165,13 +160,10 @@ def read_form(path: str | Path) -> tuple[int, int]:
     Raises:
         FileError: it cannot be read, or does not begin as a PNG file.
     """
-    with open_regular(path) as stream:
-        try:
-            start = stream.read(_TO_COLOR_TYPE)
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-    if len(start) < _TO_COLOR_TYPE or start[:8] != SIGNATURE or start[12:16] != b"IHDR":
-        raise file_error(path, "is not a PNG file", "")
+    with reading(path) as stream:
+        start = stream.read(_TO_COLOR_TYPE)
+        if len(start) < _TO_COLOR_TYPE or start[:8] != SIGNATURE or start[12:16] != b"IHDR":
+            raise ContentError("is not a PNG file")
     bits, color_type = start[24], start[25]
     return bits, _COMPONENTS.get(color_type, 1)
 
@@ -185,14 +177,10 @@ def read_scene_text(path: str | Path) -> str | None:
     return read_texts(path).get(SCENE_KEY)
 
 
-class _DamagedError(Exception):
-    """Why a file is not a whole PNG file."""
-
-
 def _read_texts(stream: BinaryIO) -> dict[str, str]:
     size = os.fstat(stream.fileno()).st_size
     if stream.read(8) != SIGNATURE:
-        raise _DamagedError("is not a PNG file")
+        raise ContentError("is not a PNG file")
     texts: dict[str, str] = {}
     place = 8
     # All chunks are read: a file that was cut short while it was copied is refused, wherever it was cut.
@@ -200,15 +188,15 @@ def _read_texts(stream: BinaryIO) -> dict[str, str]:
         head = stream.read(8)
         length, tag = int.from_bytes(head[:4], "big"), head[4:]
         if len(head) < 8 or place + 12 + length > size:
-            raise _DamagedError("is cut short: the file ends inside its data")
+            raise ContentError("is cut short: the file ends inside its data")
         if place == 8 and tag != b"IHDR":
-            raise _DamagedError("is not a PNG file: it does not begin with a header")
+            raise ContentError("is not a PNG file: it does not begin with a header")
         if tag in (b"IHDR", b"IEND", b"tEXt", b"iTXt"):
             if length > _LARGEST_TEXT:
-                raise _DamagedError(f"is damaged: a text of {length:,} bytes")
+                raise ContentError(f"is damaged: a text of {length:,} bytes")
             data, check = stream.read(length), stream.read(4)
             if zlib.crc32(tag + data).to_bytes(4, "big") != check:
-                raise _DamagedError(f"is damaged: wrong check sum of its {tag.decode('ascii')} part")
+                raise ContentError(f"is damaged: wrong check sum of its {tag.decode('ascii')} part")
             if tag in (b"tEXt", b"iTXt"):
                 texts.update(_text(tag, data))
             if tag == b"IEND":

@@ -10,13 +10,11 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass, field
-from pathlib import Path
-from typing import NoReturn
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import ContentError
 
 MAGIC = (b"#?RADIANCE", b"#?RGBE")
 _LONGEST_HEADER = 1 << 16
@@ -50,22 +48,22 @@ class RadianceHeader:
         return (self.rows, self.columns) if self.is_turned else (self.columns, self.rows)
 
 
-def read_radiance_header(path: str | Path, data: bytes) -> RadianceHeader:
+def read_radiance_header(data: bytes) -> RadianceHeader:
     """The header of a file with these bytes.
 
     Raises:
-        FileError: it is damaged, or says what no picture says.
+        ContentError: it is damaged, or says what no picture says.
     """
     header = RadianceHeader()
     end = data.find(b"\n\n", 0, _LONGEST_HEADER)
     if end < 0:
-        _damaged(path, "its header has no end")
+        raise ContentError("is damaged: its header has no end")
     stop = data.find(b"\n", end + 2, end + 200)
     size = _SIZE.fullmatch(data[end + 2 : max(stop, 0)])
     if size is None or size[2] == size[5]:
-        _damaged(path, "the line with its size is missing")
+        raise ContentError("is damaged: the line with its size is missing")
     for line in data[:end].decode("latin-1").split("\n")[1:]:
-        _take(path, header, line.strip())
+        _take(header, line.strip())
     header.is_turned = size[2] == b"X"
     # Rows go down and columns to the right if the file says "-Y height +X width".
     header.flips = (
@@ -77,37 +75,37 @@ def read_radiance_header(path: str | Path, data: bytes) -> RadianceHeader:
     return header
 
 
-def _take(path: str | Path, header: RadianceHeader, line: str) -> None:
+def _take(header: RadianceHeader, line: str) -> None:
     name, _, value = line.partition("=")
     if name == "FORMAT":
         if value not in ("32-bit_rle_rgbe", "32-bit_rle_xyze"):
-            raise file_error(path, f"is a Radiance picture of an unknown format, {value[:60]!r}", "")
+            raise ContentError(f"is a Radiance picture of an unknown format, {value[:60]!r}")
         header.is_xyz = value.endswith("xyze")
     elif name in ("EXPOSURE", "COLORCORR", "PRIMARIES"):
         try:
             numbers = tuple(float(part) for part in value.split())
         except ValueError:
-            _damaged(path, f"its {name} is no number")
+            raise ContentError(f"is damaged: its {name} is no number") from None
         wanted = {"EXPOSURE": 1, "COLORCORR": 3, "PRIMARIES": 8}[name]
         if len(numbers) != wanted or not np.isfinite(numbers).all():
-            _damaged(path, f"its {name} has not {wanted} numbers")
+            raise ContentError(f"is damaged: its {name} has not {wanted} numbers")
         if name == "PRIMARIES":
             header.primaries = numbers
         elif min(numbers) <= 0:
-            _damaged(path, f"its {name} is not above 0")
+            raise ContentError(f"is damaged: its {name} is not above 0")
         elif name == "EXPOSURE":  # all that a file names were applied one after the other
             header.exposure *= numbers[0]
         else:
             header.correction = tuple(a * b for a, b in zip(header.correction, numbers, strict=True))
 
 
-def radiance_pixels(path: str | Path, data: bytes, header: RadianceHeader) -> Floats:
+def radiance_pixels(data: bytes, header: RadianceHeader) -> Floats:
     """Red, green and blue or X, Y and Z, shape (height, width, 3), before any exposure that the header names.
 
     Raises:
-        FileError: the pixels are damaged, or not all there.
+        ContentError: the pixels are damaged, or not all there.
     """
-    rows = _rows(path, data, header)
+    rows = _rows(data, header)
     exponents = rows[..., 3]
     # (m + 0.5) 2^(e - 136): writers cut the mantissa off. An exponent of 0 is black.
     scale = np.ldexp(np.float32(1), exponents.astype(np.int32) - 136)
@@ -123,21 +121,21 @@ def radiance_pixels(path: str | Path, data: bytes, header: RadianceHeader) -> Fl
     return np.ascontiguousarray(pixels, np.float32)
 
 
-def _rows(path: str | Path, data: bytes, header: RadianceHeader) -> Bytes:
+def _rows(data: bytes, header: RadianceHeader) -> Bytes:
     found = np.zeros((header.rows, header.columns, 4), np.uint8)
     place = header.start
     for row in found:
         start = data[place : place + 4]
         if header.columns in _RUN_WIDTHS and start[:2] == b"\2\2" and len(start) == 4 and start[2] < 128:
             if start[2] << 8 | start[3] != header.columns:
-                _damaged(path, "a row has another length than the picture")
-            place = _row_of_runs(path, data, place + 4, row)
+                raise ContentError("is damaged: a row has another length than the picture")
+            place = _row_of_runs(data, place + 4, row)
         else:
-            place = _row_of_pixels(path, data, place, row)
+            place = _row_of_pixels(data, place, row)
     return found
 
 
-def _row_of_runs(path: str | Path, data: bytes, place: int, row: Bytes) -> int:
+def _row_of_runs(data: bytes, place: int, row: Bytes) -> int:
     """A row whose four kinds of bytes follow each other, in runs: above 128 one byte again and again, else as they are."""
     width = len(row)
     for part in range(4):
@@ -153,14 +151,14 @@ def _row_of_runs(path: str | Path, data: bytes, place: int, row: Bytes) -> int:
                 piece = data[place + 1 : place + 1 + count]
                 place += 1 + count
             if not count or len(piece) != count or at + count > width:
-                _damaged(path, "its pixels end too early or go beyond their row")
+                raise ContentError("is damaged: its pixels end too early or go beyond their row")
             line += piece
             at += count
         row[:, part] = np.frombuffer(line, np.uint8)
     return place
 
 
-def _row_of_pixels(path: str | Path, data: bytes, place: int, row: Bytes) -> int:
+def _row_of_pixels(data: bytes, place: int, row: Bytes) -> int:
     """A row of whole pixels, in which (1, 1, 1, n) stands for n more like the last; several after each other are digits
     of 8 bits, the lowest first."""
     width = len(row)
@@ -174,13 +172,13 @@ def _row_of_pixels(path: str | Path, data: bytes, place: int, row: Bytes) -> int
     while at < width:
         pixel = data[place : place + 4]
         if len(pixel) < 4:
-            _damaged(path, "its pixels end too early or go beyond their row")
+            raise ContentError("is damaged: its pixels end too early or go beyond their row")
         place += 4
         if pixel[:3] == b"\1\1\1":
             count = pixel[3] << shift
             shift += 8
             if not at or shift > 32 or at + count > width:
-                _damaged(path, "its pixels end too early or go beyond their row")
+                raise ContentError("is damaged: its pixels end too early or go beyond their row")
             row[at : at + count] = row[at - 1]
             at += count
         else:
@@ -188,7 +186,3 @@ def _row_of_pixels(path: str | Path, data: bytes, place: int, row: Bytes) -> int
             at += 1
             shift = 0
     return place
-
-
-def _damaged(path: str | Path, why: str) -> NoReturn:
-    raise file_error(path, f"is damaged: {why}", "")

@@ -22,7 +22,7 @@ import numpy.typing as npt
 from clfractal import arguments
 from clfractal.errors import FileError
 from clfractal.files import nrrd, volume_checks, voxel_data
-from clfractal.files.atomic import atomic_writer, check_output, file_error, open_regular
+from clfractal.files.atomic import ContentError, atomic_writer, check_output, file_error, reading
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
 from clfractal.files.system import flush
@@ -121,18 +121,13 @@ def read_volume(path: str | Path, *, limit: int | None = None) -> Volume:
     Raises:
         FileError: it cannot be read, is of another kind, damaged, cut short, or too large for memory.
     """
-    with open_regular(path) as stream:
-        try:
-            start = stream.read(8)
-            if start.startswith(nrrd.MAGIC):
-                return _read_nrrd(path, stream, limit)
-            if start.startswith(_NPY_MAGIC):
-                return _read_npy(path, stream, limit)
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
-        except MemoryError as error:
-            raise file_error(path, "is too large: out of memory", "") from error
-    raise file_error(path, "is neither a NRRD nor a NPY file", "")
+    with reading(path) as stream:
+        start = stream.read(8)
+        if start.startswith(nrrd.MAGIC):
+            return _read_nrrd(path, stream, limit)
+        if start.startswith(_NPY_MAGIC):
+            return _read_npy(path, stream, limit)
+        raise ContentError("is neither a NRRD nor a NPY file")
 
 
 def write_volume(path: str | Path, volume: Volume, *, compress: bool = False) -> None:
@@ -254,17 +249,17 @@ def _read_nrrd(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
     start = stream.read(nrrd.LARGEST_HEADER)
     head = nrrd.parse(start, path, whole=len(start) < nrrd.LARGEST_HEADER)
     if head.data_file is None:
-        values = voxel_data.read(path, stream, head, head.length, limit)
+        values = voxel_data.read(stream, head, head.length, limit)
     else:
         named = Path(path).parent / head.data_file
         if not os.path.realpath(named).startswith(os.path.realpath(Path(path).parent) + os.sep):
-            raise file_error(path, f"must have its data inside its folder, got {head.data_file[:80]!r}", "")
-        with open_regular(named) as data:
+            raise ContentError(f"must have its data inside its folder, got {head.data_file[:80]!r}")
+        with reading(named) as data:
             if os.path.samestat(os.fstat(data.fileno()), os.fstat(stream.fileno())):
                 raise FileError(
                     "must be another file: this one is the header, and holds no voxels", head.data_place
                 )
-            values = voxel_data.read(named, data, head, 0, limit)
+            values = voxel_data.read(data, head, 0, limit)
     return Volume(values, head.origin, head.directions, head.texts)
 
 
@@ -274,35 +269,35 @@ def _read_npy(path: str | Path, stream: BinaryIO, limit: int | None) -> Volume:
     version = stream.read(2)
     width = {b"\1\0": 2, b"\2\0": 4, b"\3\0": 4}.get(version)
     if width is None:
-        raise file_error(path, "is not an NPY file of version 1 to 3", "")
+        raise ContentError("is not an NPY file of version 1 to 3")
     length = int.from_bytes(stream.read(width), "little")
     if length > _LARGEST_NPY_HEADER:
-        raise file_error(path, f"is damaged: a header of {length:,} bytes", "")
+        raise ContentError(f"is damaged: a header of {length:,} bytes")
     found = _NPY_HEADER.fullmatch(stream.read(length).decode("utf-8", "replace"))
     if found is None:
-        raise file_error(path, "is damaged, or holds no plain array: its header is not understood", "")
-    dtype = _npy_dtype(path, found[1])
+        raise ContentError("is damaged, or holds no plain array: its header is not understood")
+    dtype = _npy_dtype(found[1])
     sides = [int(word.strip(" L")) for word in (found[3] or "").split(",") if word.strip()]
     if len(sides) != 3 or 0 in sides:
         shown = " x ".join(f"{side:,}" for side in sides[:8]) or "one number"
-        raise file_error(path, f"must be an array of three axes, got {shown}", "")
+        raise ContentError(f"must be an array of three axes, got {shown}")
     offset = 8 + width + length
     if found[2] == "True":
-        turned = voxel_data.plain(path, stream, dtype, (sides[2], sides[1], sides[0]), offset, limit)
-        values = voxel_data.room(path, turned.dtype, (sides[0], sides[1], sides[2]), limit)
+        turned = voxel_data.plain(stream, dtype, (sides[2], sides[1], sides[0]), offset, limit)
+        values = voxel_data.room(turned.dtype, (sides[0], sides[1], sides[2]), limit)
         values[...] = turned.T
     else:
-        values = voxel_data.plain(path, stream, dtype, (sides[0], sides[1], sides[2]), offset, limit)
+        values = voxel_data.plain(stream, dtype, (sides[0], sides[1], sides[2]), offset, limit)
     origin, directions, texts = _notes(path, values.shape)
     return Volume(values, origin, directions, texts)
 
 
-def _npy_dtype(path: str | Path, word: str) -> np.dtype[Any]:
+def _npy_dtype(word: str) -> np.dtype[Any]:
     kind = word[1:]
     if kind == "b1":
         return np.dtype(np.uint8)
     if kind not in ("i1", "u1", "i2", "u2", "i4", "u4", "i8", "u8", "f2", "f4", "f8"):
-        raise file_error(path, f"unsupported type {word!r}; known: integers and floats of up to 64 bits", "")
+        raise ContentError(f"unsupported type {word!r}; known: integers and floats of up to 64 bits")
     return np.dtype(("=" if word[0] in "=|" else word[0]) + kind)
 
 

@@ -12,15 +12,13 @@ import os
 import zlib
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
 from typing import IO, Any, BinaryIO, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.errors import FileError
 from clfractal.files import memory
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import ContentError
 from clfractal.files.nrrd import COMPRESSED, Header
 
 Values = npt.NDArray[Any]
@@ -35,34 +33,32 @@ _LONGEST_WORD = (
 _SPACE = b" \t\n\r\v\f"
 
 
-def read(path: str | Path, stream: BinaryIO, head: Header, offset: int, limit: int | None) -> Values:
+def read(stream: BinaryIO, head: Header, offset: int, limit: int | None) -> Values:
     """The voxels of a NRRD file.
 
     Args:
-        path: of the file that holds them, for errors.
-        stream: that file.
+        stream: the file that holds them.
         offset: where the data may begin: behind an attached header.
         limit: as for `read_volume`.
 
     Raises:
-        FileError: they are damaged, cut short, or too large for memory.
+        ContentError: they are damaged, cut short, or too large for memory.
     """
     if head.encoding in COMPRESSED:
-        return _unpacked(path, stream, head, offset, limit)
+        return _unpacked(stream, head, offset, limit)
     size = os.fstat(stream.fileno()).st_size
-    offset = _after_lines(path, stream, offset, head.line_skip)
+    offset = _after_lines(stream, offset, head.line_skip)
     if head.encoding == "raw":
         need = math.prod(head.shape) * head.dtype.itemsize
         offset = max(offset, size - need) if head.byte_skip < 0 else offset + head.byte_skip
-        return plain(path, stream, head.dtype, head.shape, offset, limit)
+        return plain(stream, head.dtype, head.shape, offset, limit)
     offset += head.byte_skip
     stream.seek(min(offset, size))
     digits = _words if head.encoding == "ascii" else _hexadecimal
-    return digits(path, stream, head, max(size - offset, 0), limit)
+    return digits(stream, head, max(size - offset, 0), limit)
 
 
 def plain(
-    path: str | Path,
     stream: BinaryIO,
     dtype: np.dtype[Any],
     shape: Shape,
@@ -72,31 +68,29 @@ def plain(
     """Values as they lie in the file from `offset` on: mapped if there are many."""
     size, need = os.fstat(stream.fileno()).st_size, math.prod(shape) * dtype.itemsize
     if size - offset < need:
-        raise file_error(
-            path, f"is cut short: {_sides(shape)} need {need:,} bytes, it has {max(0, size - offset):,}", ""
+        raise ContentError(
+            f"is cut short: {_sides(shape)} need {need:,} bytes, it has {max(0, size - offset):,}"
         )
     native = dtype.newbyteorder("=")
     if need >= _MAPPED and dtype == native:
         return np.memmap(stream, dtype, "r", offset, shape)
-    values = room(path, native, shape, limit)
+    values = room(native, shape, limit)
     stream.seek(offset)
-    _fill(path, values, lambda wanted: stream.readinto(wanted))  # type: ignore[attr-defined]
+    _fill(values, lambda wanted: stream.readinto(wanted))  # type: ignore[attr-defined]
     return _native(values, dtype)
 
 
-def room(path: str | Path, dtype: np.dtype[Any], shape: Shape, limit: int | None) -> Values:
+def room(dtype: np.dtype[Any], shape: Shape, limit: int | None) -> Values:
     """Memory for values, if there is enough."""
     need, have = math.prod(shape) * dtype.itemsize, memory.available() if limit is None else limit
     if need > have:
-        raise file_error(
-            path,
-            f"is too large: {_sides(shape)} need {memory.shown(need)} of memory, {memory.shown(have)} are left",
-            "",
+        raise ContentError(
+            f"is too large: {_sides(shape)} need {memory.shown(need)} of memory, {memory.shown(have)} are left"
         )
     return np.empty(shape, dtype)
 
 
-def _fill(path: str | Path, values: Values, read_into: Callable[[memoryview], int]) -> None:
+def _fill(values: Values, read_into: Callable[[memoryview], int]) -> None:
     """Reads the bytes of all values, piece by piece."""
     raw: Any = values.reshape(-1).view(np.uint8)
     for start in range(0, len(raw), _PIECE):
@@ -104,7 +98,7 @@ def _fill(path: str | Path, values: Values, read_into: Callable[[memoryview], in
         while len(wanted):
             count = read_into(wanted)
             if not count:
-                raise file_error(path, "is cut short: the file ends inside its data", "")
+                raise ContentError("is cut short: the file ends inside its data")
             wanted = wanted[count:]
 
 
@@ -115,13 +109,13 @@ def _native(values: Values, dtype: np.dtype[Any]) -> Values:
     return values
 
 
-def _after_lines(path: str | Path, stream: BinaryIO, offset: int, lines: int) -> int:
+def _after_lines(stream: BinaryIO, offset: int, lines: int) -> int:
     """The place after some lines; a file without that many ends the search."""
     stream.seek(offset)
     while lines:
         piece = stream.readline(_PIECE)
         if not piece:
-            raise file_error(path, "is cut short: it has fewer lines than its header skips", "")
+            raise ContentError("is cut short: it has fewer lines than its header skips")
         lines -= piece.endswith(b"\n")
     return stream.tell()
 
@@ -133,32 +127,30 @@ def _sides(shape: Shape) -> str:
 # --- compressed ---
 
 
-def _unpacked(path: str | Path, stream: BinaryIO, head: Header, offset: int, limit: int | None) -> Values:
+def _unpacked(stream: BinaryIO, head: Header, offset: int, limit: int | None) -> Values:
     """Values packed by gzip or bzip2; never more is unpacked than the header tells."""
     size = os.fstat(stream.fileno()).st_size
     need = math.prod(head.shape) * head.dtype.itemsize
     if head.encoding == "gzip" and need + head.byte_skip > (size - offset) * _DEFLATE_AT_MOST:
-        raise file_error(
-            path,
+        raise ContentError(
             f"is cut short: {_sides(head.shape)} need {need:,} bytes, which {max(0, size - offset):,}"
-            " compressed ones cannot hold",
-            "",
+            " compressed ones cannot hold"
         )
-    values = room(path, head.dtype.newbyteorder("="), head.shape, limit)
+    values = room(head.dtype.newbyteorder("="), head.shape, limit)
     stream.seek(offset)
     try:
         with _unpacking(stream, head) as unpacked:
             left = head.byte_skip
             while left and (skipped := len(unpacked.read(min(left, _PIECE)))):
                 left -= skipped
-            _fill(path, values, lambda wanted: _into(unpacked, wanted))
+            _fill(values, lambda wanted: _into(unpacked, wanted))
             unpacked.read(1)  # at the end of the data their check sum is compared
     except EOFError as error:
-        raise file_error(path, "is cut short: its compressed data end too early", "") from error
+        raise ContentError("is cut short: its compressed data end too early") from error
     except (OSError, zlib.error) as error:
         if isinstance(error, OSError) and error.errno is not None:
             raise  # not the data's fault
-        raise file_error(path, "is damaged: its compressed data are wrong", "") from error
+        raise ContentError("is damaged: its compressed data are wrong") from error
     return _native(values, head.dtype)
 
 
@@ -178,16 +170,14 @@ def _into(unpacked: IO[bytes], wanted: memoryview) -> int:
 # --- as text ---
 
 
-def _words(path: str | Path, stream: BinaryIO, head: Header, size: int, limit: int | None) -> Values:
+def _words(stream: BinaryIO, head: Header, size: int, limit: int | None) -> Values:
     """Numbers between spaces, line ends or commas; what comes after the last that is asked for is not looked at."""
     count = math.prod(head.shape)
     if size < 2 * count - 1:
-        raise file_error(
-            path,
-            f"is cut short: {_sides(head.shape)} need {2 * count - 1:,} characters or more, it has {size:,}",
-            "",
+        raise ContentError(
+            f"is cut short: {_sides(head.shape)} need {2 * count - 1:,} characters or more, it has {size:,}"
         )
-    values = room(path, head.dtype, head.shape, limit)
+    values = room(head.dtype, head.shape, limit)
     flat, filled, rest = values.reshape(-1), 0, b""
     while filled < count:
         piece = stream.read(_PIECE)
@@ -196,23 +186,23 @@ def _words(path: str | Path, stream: BinaryIO, head: Header, size: int, limit: i
         goes_on = piece and not piece[-1:].isspace() and piece[-1:] != b","
         rest = words.pop() if goes_on else b""
         if len(rest) > _LONGEST_WORD:
-            raise _no_number(path, filled + len(words), rest, head)
+            raise _no_number(filled + len(words), rest, head)
         words = words[: count - filled]
-        flat[filled : filled + len(words)] = _numbers(path, words, filled, head)
+        flat[filled : filled + len(words)] = _numbers(words, filled, head)
         filled += len(words)
         if not piece and filled < count:
-            raise file_error(path, f"is cut short: {_sides(head.shape)}, but {filled:,} numbers", "")
+            raise ContentError(f"is cut short: {_sides(head.shape)}, but {filled:,} numbers")
     return values
 
 
-def _numbers(path: str | Path, words: list[bytes], before: int, head: Header) -> Values:
+def _numbers(words: list[bytes], before: int, head: Header) -> Values:
     """Words as numbers of the header's type; `before`: how many came before them."""
     found = None
     with suppress(ValueError):
         found = _parsed(words, head)
     if found is None:
         wrong = next(n for n, word in enumerate(words) if not _is_number(word, head))
-        raise _no_number(path, before + wrong, words[wrong], head)
+        raise _no_number(before + wrong, words[wrong], head)
     with np.errstate(over="ignore"):  # what a float32 cannot hold becomes infinite
         return np.array(found, head.dtype)
 
@@ -237,23 +227,19 @@ def _is_number(word: bytes, head: Header) -> bool:
     return True
 
 
-def _no_number(path: str | Path, number: int, word: bytes, head: Header) -> FileError:
+def _no_number(number: int, word: bytes, head: Header) -> ContentError:
     shown = word[:40].decode("utf-8", "replace")
-    return file_error(
-        path, f"is damaged: its number {number + 1:,} is {shown!r}, which is no {head.dtype}", ""
-    )
+    return ContentError(f"is damaged: its number {number + 1:,} is {shown!r}, which is no {head.dtype}")
 
 
-def _hexadecimal(path: str | Path, stream: BinaryIO, head: Header, size: int, limit: int | None) -> Values:
+def _hexadecimal(stream: BinaryIO, head: Header, size: int, limit: int | None) -> Values:
     """Two digits for each byte, with spaces and line ends anywhere."""
     need = math.prod(head.shape) * head.dtype.itemsize
     if size < 2 * need:
-        raise file_error(
-            path,
-            f"is cut short: {_sides(head.shape)} need {2 * need:,} digits, it has {size:,} characters",
-            "",
+        raise ContentError(
+            f"is cut short: {_sides(head.shape)} need {2 * need:,} digits, it has {size:,} characters"
         )
-    values = room(path, head.dtype.newbyteorder("="), head.shape, limit)
+    values = room(head.dtype.newbyteorder("="), head.shape, limit)
     rest = b""
 
     def read_into(wanted: memoryview) -> int:
@@ -265,9 +251,9 @@ def _hexadecimal(path: str | Path, stream: BinaryIO, head: Header, size: int, li
         try:
             found = bytes.fromhex(digits.decode("ascii"))
         except ValueError:
-            raise file_error(path, "is damaged: its data are not hexadecimal", "") from None
+            raise ContentError("is damaged: its data are not hexadecimal") from None
         wanted[:count] = found
         return count
 
-    _fill(path, values, read_into)
+    _fill(values, read_into)
     return _native(values, head.dtype)

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clfractal.errors import FileError
-from clfractal.files.atomic import file_error, open_regular
+from clfractal.files.atomic import reading
 
 _IEND = b"\0\0\0\0IEND\xaeB`\x82"
 _END_OF_JPEG = b"\xff\xd9"
@@ -32,14 +32,11 @@ def is_whole(path: Path) -> bool:
     """
     if not path.exists():
         return False
-    with open_regular(path) as stream:
-        try:
-            start = stream.read(_TAIL)
-            size = os.fstat(stream.fileno()).st_size
-            stream.seek(max(size - _TAIL, 0))
-            tail = stream.read(_TAIL)
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
+    with reading(path) as stream:
+        start = stream.read(_TAIL)
+        size = os.fstat(stream.fileno()).st_size
+        stream.seek(max(size - _TAIL, 0))
+        tail = stream.read(_TAIL)
     kind = path.suffix.lower()
     if kind not in _SIGNATURES:
         return size > 0
@@ -67,11 +64,8 @@ def is_foreign(path: Path) -> bool:
     signature = _SIGNATURES.get(path.suffix.lower(), b"")
     if not path.exists():
         return False
-    with open_regular(path) as stream:
-        try:
-            start = stream.read(len(signature))
-        except OSError as error:
-            raise file_error(path, "cannot be read", error) from error
+    with reading(path) as stream:
+        start = stream.read(len(signature))
     return bool(start.strip(b"\0")) and not signature.startswith(start)
 
 
