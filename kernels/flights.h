@@ -5,7 +5,7 @@
 // each, and is weighed by the chance of it in the mean of all, as if each colour had chosen (the balance heuristic; Wilkie and others 2014,
 // Hero Wavelength Spectral Sampling): no colour weighs more than the sum of all did.
 
-INLINE mask is_cloudy(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
+INLINE mask is_participating(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
 
 // What a medium leaves of light on a way through it.
 INLINE color absorbed(color light, color extinction, real way) {
@@ -24,14 +24,14 @@ INLINE void flight_begins(carried *with, color through, real u, real choice, mas
     const color shares = shares_of(through), taken = with->extinction;
     const mask red = less(choice, shares.r), green = less(choice, shares.r + shares.g);
     const real of_one = pick(red, taken.r, pick(green, taken.g, taken.b));
-    const mask ends = is_cloudy(with) & less(R(1e-20), of_one);
+    const mask ends = is_participating(with) & less(R(1e-20), of_one);
     const real flight = pick(ends, -log(u) / fmax(of_one, R(1e-20)), (real)(REAL_LARGEST));
     with->flight = pick(here, flight, with->flight);
 }
 
 // Weighs the path's way to what it has met, `far` away, or to where it is scattered before; the result says where it is.
 INLINE mask flight_ends(path *so_far, const carried *with, real far, mask here) {
-    here &= is_cloudy(with);
+    here &= is_participating(with);
     const mask scatters = here & less(with->flight, far);
     const real way = fmin(with->flight, far);
     const color shares = shares_of(so_far->through), comes = absorbed(color_of(R(1.0), R(1.0), R(1.0)), with->extinction, way);

@@ -3,7 +3,7 @@
 //
 // A ray begins where another has met the surface, which may be some footprints before the set: until it is inside its steps grow from
 // a part of a footprint. One that does not find the set there has met a sheet without an inside, and leaves at once. Where media scatter
-// light this is a part of walks (walks.h), whose first place to test is the very beginning.
+// light this is a part of walks (random_walk.h), whose first place to test is the very beginning.
 #define ENTRANCE_REACH R(16.0)      // footprints before the set, at the most ...
 #define ENTRANCE_START R(0.0625)    // ... and the first place to test beyond its beginning
 #define ENTRANCE_GROWTH R(0.5)      // of the way so far

@@ -1,6 +1,6 @@
 // Entry points: media that scatter light beside the set, which are clouds, milk and what is below boundaries. They know no formula.
 #include "path_stages.h"
-#include "cloudy.h"
+#include "participating_media.h"
 #include "clouds.h"
 
 // Finds the paths that a medium scatters before what they have met, and halts them there. Glass has then scattered them, and the stage of

@@ -124,7 +124,7 @@ INLINE real way_within(const carried *with, real way, world w) {
 
 // Lets a clear medium absorb light on a path's way to what it has met.
 INLINE void path_absorbs(path *so_far, const carried *with, real far, mask here, world w) {
-    here &= less(R(0.0), with->medium) & ~is_cloudy(with);
+    here &= less(R(0.0), with->medium) & ~is_participating(with);
     so_far->through = color_pick(here, absorbed(so_far->through, with->extinction, way_within(with, far, w)), so_far->through);
 }
 

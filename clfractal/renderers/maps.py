@@ -12,7 +12,7 @@ from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
-from clfractal.scene.blends import Blends, blends_of, has_skin, is_cloudy, is_glass
+from clfractal.scene.blends import Blends, blends_of, is_glass, is_participating, is_subsurface
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.materials import MAX_MATERIALS
@@ -243,16 +243,16 @@ def has_glass_set(scene: Scene) -> bool:
     return bodies[0] or any(joined)
 
 
-def has_cloudy_glass(scene: Scene) -> bool:
+def has_participating_media(scene: Scene) -> bool:
     """Whether anything that paths go through scatters light on the way."""
-    cloudy = any(is_cloudy(each, scene.materials) for each in used_materials(scene))
-    return has_subsurface(scene) or (has_glass(scene) and cloudy)
+    participating = any(is_participating(each, scene.materials) for each in used_materials(scene))
+    return has_subsurface(scene) or (has_glass(scene) and participating)
 
 
 def has_subsurface(scene: Scene) -> bool:
     """Whether paths go below boundaries and come out elsewhere."""
     return isinstance(scene.lighting, PathLighting) and any(
-        has_skin(each, scene.materials) for each in used_materials(scene)
+        is_subsurface(each, scene.materials) for each in used_materials(scene)
     )
 
 
@@ -261,7 +261,7 @@ def glass_bodies(scene: Scene) -> list[bool]:
     if not isinstance(scene.lighting, PathLighting):
         return [False] * (1 + len(scene.objects))
     known = scene.materials
-    own, *others = [is_glass(each, known) or has_skin(each, known) for each in used_materials(scene)]
+    own, *others = [is_glass(each, known) or is_subsurface(each, known) for each in used_materials(scene)]
     # (A cloud has no material of its own, and not the set's either.)
     named = scene.objects.values()
     return [

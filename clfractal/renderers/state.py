@@ -34,7 +34,7 @@ from clfractal.renderers.carried import (
     TOUCH,
     WITHIN,
 )
-from clfractal.renderers.maps import asked_maps, bump_numbers, has_bump, has_cloudy_glass, has_glass
+from clfractal.renderers.maps import asked_maps, bump_numbers, has_bump, has_glass, has_participating_media
 from clfractal.renderers.materials import matter_numbers
 from clfractal.renderers.passes import has_mattes, has_parts
 from clfractal.renderers.plan import Plan
@@ -104,7 +104,7 @@ PARTS = (
     Part("PATH", PATH.numbers, lambda scene, plan: int(_goes_on(scene))),
     Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
     Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
-    Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_cloudy_glass(scene))),
+    Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_participating_media(scene))),
     Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
     # What rays to wide lights have brought, and lights that are before the spot.
     Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),

@@ -198,7 +198,9 @@ PROGRAMS = (
     _Program("gather", "gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     _Program("media", "media.cl", ("cross_media", "pass_clouds"), path_defines),
     _Program("glass", "glass.cl", ("march_inside", "look_inside_set"), march_defines, formula=True),
-    _Program("walks", "walks.cl", ("walk_inside", "look_where_walks_end"), state_defines, formula=True),
+    _Program(
+        "random_walk", "random_walk.cl", ("walk_inside", "look_where_walks_end"), state_defines, formula=True
+    ),
     _Program("colors", "color_spots.cl", ("color_spots",), state_defines, formula=True),
     _Program("glow", "glow.cl", ("add_glow",), state_defines, formula=True),
     _Program(

@@ -29,8 +29,8 @@ from clfractal.renderers.maps import (
     MappedMaterials,
     asked_maps,
     bump_numbers,
-    has_cloudy_glass,
     has_glass_set,
+    has_participating_media,
 )
 from clfractal.renderers.object_grids import clouds_of
 from clfractal.renderers.plan import Plan
@@ -90,7 +90,7 @@ def meets_objects(scene: Scene) -> bool:
 def has_media(scene: Scene) -> bool:
     """Whether anything scatters paths on their way: clouds, or glass."""
     along_paths = isinstance(scene.lighting, PathLighting)
-    return has_cloudy_glass(scene) or (along_paths and bool(clouds_of(scene)))
+    return has_participating_media(scene) or (along_paths and bool(clouds_of(scene)))
 
 
 def finds_materials(scene: Scene) -> bool:
@@ -182,9 +182,9 @@ def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
 
 
 def inside_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
-    """The kernels of `kernels/glass.cl`, or of `walks.cl` where anything scatters light on the way."""
-    cloudy = has_cloudy_glass(scene)
-    found = ("walk_inside", "look_where_walks_end") if cloudy else ("march_inside", "look_inside_set")
+    """The kernels of `kernels/glass.cl`, or of `random_walk.cl` where anything scatters light on the way."""
+    participating = has_participating_media(scene)
+    found = ("walk_inside", "look_where_walks_end") if participating else ("march_inside", "look_inside_set")
     return found if plan.lanes == 1 else found[:1]
 
 

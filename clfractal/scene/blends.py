@@ -57,18 +57,18 @@ def is_glass(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     return isinstance(weight, Map) or weight > 0
 
 
-def has_skin(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+def is_subsurface(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     """Whether light may go below a material's boundary, or that of a part of what it is blended of; likewise."""
     if material.blend is not None:
-        return any(has_skin(named[name], named) for name in material.blend)
+        return any(is_subsurface(named[name], named) for name in material.blend)
     weight = material.subsurface.weight
     return isinstance(weight, Map) or weight > 0
 
 
-def is_cloudy(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+def is_participating(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     """Whether a material, or a part of what it is blended of, scatters light on its way through; likewise."""
     if material.blend is not None:
-        return any(is_cloudy(named[name], named) for name in material.blend)
+        return any(is_participating(named[name], named) for name in material.blend)
     return is_glass(material, named) and material.transmission.scatter != BLACK
 
 

@@ -2,7 +2,7 @@
 
 from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.blends import has_skin, is_glass
+from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
@@ -157,8 +157,8 @@ def _inside(scene: Scene, material: str | None) -> str:
     if _lets_through(scene, material):
         return "glass"
     paths = isinstance(scene.lighting, PathLighting)
-    skin = paths and material is not None and has_skin(scene.materials[material], scene.materials)
-    return "subsurface" if skin else ""
+    subsurface = paths and material is not None and is_subsurface(scene.materials[material], scene.materials)
+    return "subsurface" if subsurface else ""
 
 
 def _check_material(scene: Scene, name: str, material: str | None) -> None:

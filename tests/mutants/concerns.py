@@ -47,7 +47,7 @@ kernels/rectangles.h: render/rectangles render/emitter_places render/light_shape
 kernels/light_asks.h: render/emitters render/light_shapes render/paths
 kernels/media.h: render/glass_objects
 kernels/glass_paths.h: render/glass_paths render/glass_objects
-kernels/cloudy.h: render/cloudy
+kernels/participating_media.h: render/participating_media
 kernels/bump.h: render/bump
 kernels/bsdf_bumped.h: render/bumped_materials
 kernels/events.h: render/clouds render/paths render/subsurface

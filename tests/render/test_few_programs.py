@@ -82,8 +82,8 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
         {"materials"},
     ),
     "glass": ({"materials": {"m": GLASS}, "material": {"name": "m"}}, {"glass"}),
-    "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"walks", "media"}),
-    "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"walks", "media"}),
+    "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"random_walk", "media"}),
+    "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"random_walk", "media"}),
 }
 # What may be joined to a formula, and in which ways: beside the formulas all of it is data.
 HAST = {"type": "formula", "formula": {"name": "hast", "iterations": 9}, "position": [1, 0, 0]}
@@ -103,7 +103,7 @@ JOINED: dict[str, dict[str, Any]] = {
     },
 }
 # Programs that know the formula, and whether anything is joined to it.
-OF_FORMULA = {"rays", "point_rays", "steps", "colors", "glow", "planes", "glass", "walks"}
+OF_FORMULA = {"rays", "point_rays", "steps", "colors", "glow", "planes", "glass", "random_walk"}
 
 
 def scene(formula: dict[str, Any] = FORMULA, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
@@ -330,7 +330,7 @@ ASKING: dict[str, Any] = {
 def test_joins_are_data(joined: str, device: Device) -> None:
     known, other = (texts(scene(FORMULA, objects=JOINED[each], **ASKING), device) for each in ("cut", joined))
     assert other == known
-    assert set(known) >= OF_FORMULA - {"point_rays", "steps", "glass", "walks"}
+    assert set(known) >= OF_FORMULA - {"point_rays", "steps", "glass", "random_walk"}
 
 
 @pytest.mark.parametrize("join", ["union", "cut", "smooth_union", "intersection"])

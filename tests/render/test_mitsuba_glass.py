@@ -82,7 +82,9 @@ def medium_of(
     return {"extinction": extinction.tolist(), "albedo": (scatters / extinction).tolist(), "g": g}
 
 
-def cloudy(color: Sequence[float], depth: float, scatter: Sequence[float], g: float) -> tuple[Any, Any, Any]:
+def participating(
+    color: Sequence[float], depth: float, scatter: Sequence[float], g: float
+) -> tuple[Any, Any, Any]:
     """The same ball for both."""
     values = {
         "weight": 1,
@@ -126,8 +128,8 @@ BALLS: dict[str, tuple[dict[str, Any], dict[str, Any], dict[str, Any] | None]] =
         {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.7, 0.8, 0.9]}},
         None,
     ),
-    "milk": cloudy([0.8, 0.8, 0.8], 1.0, [0.7, 0.7, 0.7], 0.0),
-    "rose": cloudy([0.95, 0.75, 0.6], 0.5, [0.9, 0.85, 0.8], 0.6),
+    "milk": participating([0.8, 0.8, 0.8], 1.0, [0.7, 0.7, 0.7], 0.0),
+    "rose": participating([0.95, 0.75, 0.6], 0.5, [0.9, 0.85, 0.8], 0.6),
 }
 # Those of a medium that scatters: an object far from the set, of which paths know that nothing is near; and the set.
 OBJECTS = {"rose"}

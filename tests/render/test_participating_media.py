@@ -1,5 +1,5 @@
-"""Glass that scatters light (`kernels/cloudy.h`): media keep light, weaken it by Beer and Lambert's law, and are as deep as
-Chandrasekhar's.
+"""Glass that scatters light (`participating_media.h`): media keep light, weaken it by Beer and Lambert's law, and are
+as deep as Chandrasekhar's.
 """
 
 from __future__ import annotations
@@ -167,7 +167,7 @@ def test_only_glass_that_scatters_has_stages_for_it(scatter: float | None) -> No
     found = scene_of(lighting=path(2), materials=materials, material={"name": "m"})
     plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
     names = {text.name for text in program_texts(found, plan)}
-    assert names & {"glass", "walks", "media"} == ({"walks", "media"} if scatter else {"glass"})
+    assert names & {"glass", "random_walk", "media"} == ({"random_walk", "media"} if scatter else {"glass"})
 
 
 @pytest.mark.combination
@@ -176,9 +176,9 @@ def test_what_differs_from_place_to_place_is_that_where_paths_go_in() -> None:
     scatter = {"by": "normal", "palette": [[0, 0, 0], [0, 0, 0], [0.9, 0.9, 0.9], [0.9, 0.9, 0.9]]}
     objects = {"body": {**BODIES["sphere"], "material": "m"}}
     dark: dict[str, Any] = {"color": [E, E, E], "depth": 0.3}
-    mixed, cloudy = (
+    mixed, participating = (
         colors_of(scene(objects, {"m": milk(1.0, scatter=each, **dark)}), 32)[..., 0].mean(axis=1)
         for each in (scatter, [0.9, 0.9, 0.9])
     )
-    assert abs(mixed[4:9] / cloudy[4:9] - 1).max() < 0.05
-    assert (mixed[20:26] < cloudy[20:26] - 0.1).all()
+    assert abs(mixed[4:9] / participating[4:9] - 1).max() < 0.05
+    assert (mixed[20:26] < participating[20:26] - 0.1).all()

@@ -11,7 +11,7 @@
 #include "share.h"
 #include "surface_at.h"
 #include "exits.h"
-#include "walks.h"
+#include "random_walk.h"
 
 STAGE(walk_inside) {
     const queue q = inside_of(rays, met, wave, queue_stride, settings, settings->meets_objects);

@@ -1,4 +1,5 @@
-// Glass beside the set that scatters light: milk, jade, cloudy water. How far a flight goes is in flights.h; the set's walks are in walks.h.
+// Participating media beside the set, glass that scatters light: milk, jade, cloudy water. How far a flight
+// goes is in flights.h; the set's walks are in random_walk.h.
 //
 // No lamp is asked for: the boundary would bend the way to it. So the density of the direction is -1, and all light is met by chance.
 #define PURPOSE_TURN 0x10000u   // from the numbers of one scattering to those of the next

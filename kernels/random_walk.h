@@ -1,5 +1,5 @@
-// Walks within the set: a path goes from scattering to scattering until it is where it leaves the set, or meets an object or a lamp that
-// stands within. All of it counts as one bounce.
+// Random walks within the set: a path goes from scattering to scattering until it is where it leaves the set, or meets an object
+// or a lamp that stands within. All of it counts as one bounce.
 //
 // A walk begins where the set does: a ray starts where another has met the surface, which may be some footprints before it or a part of
 // one in it. So the entrance is looked for on both sides, and halved down to a small part of a free path. Flights from there on are
