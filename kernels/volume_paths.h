@@ -12,7 +12,7 @@ typedef struct {
     color through, seen;
     real density, total;   // with which its direction was chosen, -1 from the eye; what all lights weighed there
     mask on_path;
-} wanderer;
+} volume_path;
 
 // Where the grid's part of a ray up to `distance` ends, and whether there is one.
 INLINE mask into_grid(vec origin, vec direction, real distance, world w, grid_ray *g, real *far) {
@@ -22,22 +22,22 @@ INLINE mask into_grid(vec origin, vec direction, real distance, world w, grid_ra
     return inside;
 }
 
-INLINE void wander_square(const packet_pixels *at, int sample, uint purpose, int bounce, world w, real *u, real *v) {
+INLINE void volume_path_square(const packet_pixels *at, int sample, uint purpose, int bounce, world w, real *u, real *v) {
     unit_square((bits)((uint)sample), pixel_seed(at->columns, at->rows, w.settings->seed, purpose + 16u * (uint)bounce), u, v);
 }
 
 // Adds light to what a path has seen; from the second place on no more than the limit.
-INLINE void wander_adds(wanderer *p, color light, int bounce, mask here, world w) {
+INLINE void volume_path_adds(volume_path *p, color light, int bounce, mask here, world w) {
     color more = color_mul(light, p->through);
     if (bounce > 0) more = color_limited(more, (real)(w.settings->firefly_limit));
     p->seen = color_pick(here, color_add(p->seen, more), p->seen);
 }
 
 // Asks one light, and goes on.
-INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, int bounce, mask here, stream *random, world w, real *looked) {
+INLINE void volume_path_scatters(volume_path *p, const packet_pixels *at, int sample, int bounce, mask here, stream *random, world w, real *looked) {
     real u, v, choice, roulette;
-    wander_square(at, sample, PURPOSE_ASK, bounce, w, &u, &v);
-    wander_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
+    volume_path_square(at, sample, PURPOSE_ASK, bounce, w, &u, &v);
+    volume_path_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
     p->total = weight_of_all(p->origin, R(0.0), w);
     const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
     const medium_event e = {p->direction, (real)(w.settings->anisotropy)};
@@ -52,8 +52,8 @@ INLINE void wander_scatters(wanderer *p, const packet_pixels *at, int sample, in
     const mask crosses = asks & ~a.unblocked & into_grid(p->origin, a.ray.toward, a.ray.distance, w, &to_light, &far);
     real comes = R(1.0);
     if (any_lane(crosses)) comes = track_through(to_light, far, crosses, random, w, looked);
-    wander_adds(p, color_scale(brings, comes), bounce, asks, w);
-    wander_square(at, sample, PURPOSE_SCATTER, bounce, w, &u, &v);
+    volume_path_adds(p, color_scale(brings, comes), bounce, asks, w);
+    volume_path_square(at, sample, PURPOSE_SCATTER, bounce, w, &u, &v);
     const onward next = medium_sample(&e, u, v);
     p->density = next.density;
     p->direction = vec_pick(here, next.direction, p->direction);
@@ -68,7 +68,7 @@ typedef struct {
 } first_met;
 
 // Follows paths from the eye; what is past all is left to the picture's own background.
-INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, int sample, world w, real *looked) {
+INLINE first_met follow_path(volume_path *p, const packet_pixels *at, real picture_y, int sample, world w, real *looked) {
     stream random = stream_of(at, w.settings->seed, PURPOSE_FLIGHT, sample);
     first_met first = {p->on_path & ~p->on_path, vec_of(R(0.0), R(0.0), R(0.0)), vec_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     for (int bounce = 0; bounce <= w.settings->bounces + 1; ++bounce) {
@@ -80,12 +80,12 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
         const mask crosses = p->on_path & into_grid(p->origin, p->direction, lamp_far, w, &g, &far);
         color shines = color_of(R(0.0), R(0.0), R(0.0));
         const mask met = track(g, far, crosses, &random, w, &number, &value, &shines, looked);
-        if (w.settings->shines) wander_adds(p, shines, bounce, crosses, w);
+        if (w.settings->shines) volume_path_adds(p, shines, bounce, crosses, w);
         const mask ends = p->on_path & ~met;
         if (bounce > 0) {
-            wander_adds(p, light_at_end(p->origin, p->direction, &before, picture_y, p->density, p->total, w), bounce, ends, w);
+            volume_path_adds(p, light_at_end(p->origin, p->direction, &before, picture_y, p->density, p->total, w), bounce, ends, w);
         } else {
-            wander_adds(p, before.shows, bounce, ends & before.met, w);
+            volume_path_adds(p, before.shows, bounce, ends & before.met, w);
             first.found = met | (before.met & ends);
             first.point = vec_along(p->origin, pick(met, distance_of(g, number, w), lamp_far), p->direction);
             first.value = pick(met, value, R(0.0));
@@ -104,16 +104,16 @@ INLINE first_met wander(wanderer *p, const packet_pixels *at, real picture_y, in
         p->through = color_pick(met, color_mul(p->through, color_of(fmin(keeps.r, R(1.0)), fmin(keeps.g, R(1.0)), fmin(keeps.b, R(1.0)))),
                                 p->through);
         p->on_path &= less(R(0.0), brightest(p->through));
-        wander_scatters(p, at, sample, bounce, p->on_path, &random, w, looked);
+        volume_path_scatters(p, at, sample, bounce, p->on_path, &random, w, looked);
     }
     return first;
 }
 
 INLINE shot take_path(const packet_pixels *at, ray r, real y, real time, int sample, mask wanted, world w, real *steps) {
     const color none = color_of(R(0.0), R(0.0), R(0.0));
-    wanderer p = {r.origin, r.direction, color_of(R(1.0), R(1.0), R(1.0)), none, R(-1.0), R(1.0), wanted};
+    volume_path p = {r.origin, r.direction, color_of(R(1.0), R(1.0), R(1.0)), none, R(-1.0), R(1.0), wanted};
     real looked = R(0.0);
-    const first_met first = wander(&p, at, y, sample, w, &looked);
+    const first_met first = follow_path(&p, at, y, sample, w, &looked);
     shot s;
     s.coverage = pick(first.found, R(1.0), R(0.0));
     s.hit = first.found;

@@ -214,7 +214,7 @@ def test_light_scattered_once(device: Device, folder: Path, light: str, g: float
     assert error < 5 * 2.0 * expected.max() / np.sqrt(256)
 
 
-def wandering(scene: Scene, g: float, orders: int, count: int) -> float:
+def followed(scene: Scene, g: float, orders: int, count: int) -> float:
     """Mean light of the picture with albedo COLOR[0], lit by the sun: paths of NumPy, scattered up to `orders` times."""
     random = np.random.default_rng(11)
     origin, direction, near, far = (
@@ -247,7 +247,7 @@ def wandering(scene: Scene, g: float, orders: int, count: int) -> float:
 def test_light_scattered_often(device: Device, folder: Path, g: float, bounces: int) -> None:
     """Beside paths of NumPy, with as many orders of scattering."""
     scene = medium(folder, lights=[LIGHTS["sun"][0]], anisotropy=g, bounces=bounces, samples=2048)
-    expected = wandering(scene, g, bounces + 1, 2048)
+    expected = followed(scene, g, bounces + 1, 2048)
     assert light_of(scene, device)[..., 0].mean() == pytest.approx(expected, rel=0.015)
 
 
