@@ -47,7 +47,7 @@ STAGE(end_paths) {
     if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, on_path, w);
     path_ends(s, &so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
     if (HAS(w, EMITTERS)) path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
-    if (bounce == 1 && KEEPS(s, STATE_GLANCE)) glance_once(s, so_far.seen);
+    if (bounce == 1 && KEEPS(s, STATE_AOVS)) aovs_once(s, so_far.seen);
     const spot first_spot = spot_kept(s, 0);
     end_shots(s, a, so_far.seen, &first_spot, cost, w);
 }

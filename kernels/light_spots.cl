@@ -27,8 +27,8 @@ STAGE(light_spots) {
         else gathered = light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
         gathered = color_pick(on_face(&found), found.tint, gathered);
     }
-    if (bounce == 0 && KEEPS(s, STATE_GLANCE)) {
-        glance_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
+    if (bounce == 0 && KEEPS(s, STATE_AOVS)) {
+        aovs_begin(s, mask_of(so_far.on_path) & mask_of(found.found), found.tint, color_of(R(0.0), R(0.0), R(0.0)), found.normal);
     }
     const int last = bounce == settings->bounces;
     const color mirrored = color_pick(on_face(&found), color_of(R(0.0), R(0.0), R(0.0)), mirrored_at(&found, direction, w));

@@ -48,7 +48,7 @@ STAGE(scatter_paths) {
         }
         p.emerges = number_of(emerges);
         spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), lands & ~edge.hidden & ~emerges, w);
-        if (KEEPS(s, STATE_GLANCE)) reflects = pbr_albedo(&p, w.albedos);
+        if (KEEPS(s, STATE_AOVS)) reflects = pbr_albedo(&p, w.albedos);
         const vec to_viewer = vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0)));
         e.surface = bsdf_of_spot(s, &found, &p, edge.leaving, to_viewer, &shading, w);
     }
@@ -80,9 +80,9 @@ STAGE(scatter_paths) {
         STATE_KEEP(s, over, STATE_HALT);
         so_far.on_path += left_alone;
     }
-    if (KEEPS(s, STATE_GLANCE)) {
-        if (bounce == 0) glance_begin(s, lands, reflects, so_far.seen, shading);
-        if (bounce == 1) glance_once(s, so_far.seen);
+    if (KEEPS(s, STATE_AOVS)) {
+        if (bounce == 0) aovs_begin(s, lands, reflects, so_far.seen, shading);
+        if (bounce == 1) aovs_once(s, so_far.seen);
     }
     with.awaited = color_pick(scatters, with.awaited, black);
     STATE_KEEP(s, so_far, STATE_PATH);

@@ -1,35 +1,35 @@
 // Shots as pixels keep them: what has been seen, put together with all that lies before and behind it.
 
 // The normal by which a shot's first surface has scattered light; `own` is the surface's.
-INLINE vec normal_seen(glance look, vec own, world w) { return HAS(w, BUMP) ? look.normal : own; }
+INLINE vec normal_seen(aovs outputs, vec own, world w) { return HAS(w, BUMP) ? outputs.normal : own; }
 
 // A shot's layers, of the part of its surface that is in the picture: `comes`. Of what its path has seen in all, that part is light; and a
 // surface that fog hides must not tell the filter of detail where there is none.
-INLINE parts parts_of(glance look, color seen, vec normal, real comes, world w) {
+INLINE parts parts_of(aovs outputs, color seen, vec normal, real comes, world w) {
     parts found;
-    found.albedo = color_scale(look.albedo, comes);
-    found.emission = color_scale(look.emission, comes);
-    found.direct = color_scale(color_add(look.once, color_scale(look.emission, R(-1.0))), comes);
-    found.indirect = color_scale(color_add(seen, color_scale(look.once, R(-1.0))), comes);
+    found.albedo = color_scale(outputs.albedo, comes);
+    found.emission = color_scale(outputs.emission, comes);
+    found.direct = color_scale(color_add(outputs.once, color_scale(outputs.emission, R(-1.0))), comes);
+    found.indirect = color_scale(color_add(seen, color_scale(outputs.once, R(-1.0))), comes);
     const vec none = vec_of(R(0.0), R(0.0), R(0.0));   // where nothing is found there is no normal
-    found.normal = vec_scale(vec_pick(less(R(0.0), comes), normal_seen(look, normal, w), none), comes);
+    found.normal = vec_scale(vec_pick(less(R(0.0), comes), normal_seen(outputs, normal, w), none), comes);
     return found;
 }
 
 // Keeps what the first spot reflects, white where it is a light, the light seen so far, and the normal of its relief, where it has one.
-INLINE void glance_begin(stage s, mask surface, color albedo, color seen, vec normal) {
-    glance look;
-    look.albedo = color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0)));
-    look.emission = look.once = seen;
-    look.normal = normal;
-    STATE_KEEP(s, look, STATE_GLANCE);
+INLINE void aovs_begin(stage s, mask surface, color albedo, color seen, vec normal) {
+    aovs outputs;
+    outputs.albedo = color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0)));
+    outputs.emission = outputs.once = seen;
+    outputs.normal = normal;
+    STATE_KEEP(s, outputs, STATE_AOVS);
 }
 
 // Keeps the light seen so far as that which was reflected once at most.
-INLINE void glance_once(stage s, color seen) {
-    STATE_KEPT(s, glance, look, STATE_GLANCE);
-    look.once = seen;
-    STATE_KEEP(s, look, STATE_GLANCE);
+INLINE void aovs_once(stage s, color seen) {
+    STATE_KEPT(s, aovs, outputs, STATE_AOVS);
+    outputs.once = seen;
+    STATE_KEEP(s, outputs, STATE_AOVS);
 }
 
 // The shot at its end: what its path has seen, over the background; and what it has found first.
@@ -79,9 +79,9 @@ INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, 
         beside = color_scale(layers.behind, layers.front_through * (R(1.0) - result.coverage));
         result = planes_into(result, seen, background, layers, a.time, w.view);
     }
-    if (!KEEPS(s, STATE_GLANCE)) return result;
-    STATE_KEPT(s, glance, look, STATE_GLANCE);
-    result.of_light = parts_of(look, in_all, found.normal, comes, w);
+    if (!KEEPS(s, STATE_AOVS)) return result;
+    STATE_KEPT(s, aovs, outputs, STATE_AOVS);
+    result.of_light = parts_of(outputs, in_all, found.normal, comes, w);
     // Rays that meet nothing have seen what shines before it.
     const color past = color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past));
     result.of_light.emission = color_add(color_add(result.of_light.emission, past), color_scale(glow, of_ways + of_past));

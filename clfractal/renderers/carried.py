@@ -212,8 +212,8 @@ LAYERS = _carried(
     ("vec", "point", ""),
     ("real", "count", "escape count"),
 )
-GLANCE = _carried(
-    "glance",
+AOVS = _carried(
+    "aovs",
     "What a shot knows of its layers before its end.",
     ("color", "albedo", "of the first surface"),
     ("color", "emission", "what the path had seen before any light was reflected ..."),
@@ -278,7 +278,7 @@ TYPES = (
     LAMP_BEFORE,
     FACE,
     LAYERS,
-    GLANCE,
+    AOVS,
 )
 
 

@@ -12,11 +12,11 @@ from itertools import accumulate
 
 from clfractal.renderers.carried import (
     AIM_AT,
+    AOVS,
     ASKED_LIGHT,
     FACE,
     FACET,
     FLIGHT,
-    GLANCE,
     HALT,
     LAMP_BEFORE,
     LAYERS,
@@ -120,7 +120,7 @@ PARTS = (
     Part("RELIEF", RELIEF.numbers, lambda scene, plan: int(has_bump(scene))),
     Part("FACE", FACE.numbers, lambda scene, plan: int(has_faces(scene))),
     Part("LAYERS", LAYERS.numbers, lambda scene, plan: int(bool(scene.cut_planes))),
-    Part("GLANCE", GLANCE.numbers, lambda scene, plan: int(has_parts(plan))),
+    Part("AOVS", AOVS.numbers, lambda scene, plan: int(has_parts(plan))),
     Part("PARTS", PARTS_OF_LIGHT.numbers, lambda scene, plan: int(has_parts(plan))),
     Part("MATTES", MATTES.numbers, lambda scene, plan: int(has_mattes(plan))),
 )
