@@ -74,8 +74,8 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
         limit = most + (orbit->longest - orbit->iterations);
     }
     const orbit_end last = {count, inside};
-    const orbit_told told = {.square = square, .square_before = square_before};
-    const real found = smooth ? formula_smooth_count(last, told, orbit) : count;
+    const orbit_result result = {.square = square, .square_before = square_before};
+    const real found = smooth ? formula_smooth_count(last, result, orbit) : count;
     return (escaped){pick(inside, (real)((scalar)most), found), inside, count};
 }
 

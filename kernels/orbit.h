@@ -180,19 +180,19 @@ INLINE clearance formula_dual_distance(vec point, mask active, int of, orbit_rec
 
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
 // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
-INLINE real formula_smooth_count(orbit_end end, orbit_told told, orbit_record orbit) {
+INLINE real formula_smooth_count(orbit_end end, orbit_result result, orbit_record orbit) {
     const real log_radius = (real)(orbit->log_distance_bailout);
     real over;
-    if (LOGARITHMIC) over = log2(R(0.5) * log(fmax(told.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
-    else over = (R(0.5) * log(told.square) - log_radius) / (R(0.5) * log(told.square / told.square_before));
+    if (LOGARITHMIC) over = log2(R(0.5) * log(fmax(result.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
+    else over = (R(0.5) * log(result.square) - log_radius) / (R(0.5) * log(result.square / result.square_before));
     const real smooth = end.count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
     return pick(end.inside, (real)((scalar)orbit->iterations), smooth);
 }
 
 // The potential G = log|z_n| / degree^n, which falls towards the solid. Linear maps have none: 0, as near as can be.
-INLINE real formula_potential(orbit_end end, orbit_told told, orbit_record orbit) {
+INLINE real formula_potential(orbit_end end, orbit_result result, orbit_record orbit) {
     if (!LOGARITHMIC) return R(0.0);
-    return R(0.34657359028) * quick_log2(told.square) * exp2(-end.count * (real)(orbit->log2_degree));
+    return R(0.34657359028) * quick_log2(result.square) * exp2(-end.count * (real)(orbit->log2_degree));
 }
 
 // The distance used for marching: the cheapest that the formula offers.

@@ -42,17 +42,17 @@ typedef struct {
     real count;          // the count of the nearest one ...
     real of;             // ... its number ...
     real solid;          // ... and that of what the surface belongs to: the same, or what has cut it
-} orbit_told;
+} orbit_result;
 
 // What is known of a point on the surface, from one orbit over dual numbers.
 typedef struct {
     vec gradient;        // of the distance or the surface, not normalised: points away from the solid
-    orbit_told own;
+    orbit_result own;
     // Of several solids, where two of them flow together: the other one's part of the colour, and what is known of that one.
     real share;
-    orbit_told other;
+    orbit_result other;
 } surface_point;
-#define SURFACE_ALONE (3 + NUMBERS_OF(orbit_told))  // numbers of it where nothing flows
+#define SURFACE_ALONE (3 + NUMBERS_OF(orbit_result))  // numbers of it where nothing flows
 
 // Whose gradient is asked for: the distance's, of the last z; or that of the surface which is shown.
 #define OF_DISTANCE 0

@@ -8,8 +8,8 @@
 NUMBERS_PICKED(surface_point)
 
 // A number between those of both, as far as each has one.
-INLINE real shared(real own, real other, mask own_told, mask other_told, real share) {
-    return pick(own_told & other_told, own + share * (other - own), pick(other_told, other, own));
+INLINE real shared(real own, real other, mask own_known, mask other_known, real share) {
+    return pick(own_known & other_known, own + share * (other - own), pick(other_known, other, own));
 }
 
 // The surface where `more` flows into all before it, whose part is `of_more`. Of three that meet in one place the two count which

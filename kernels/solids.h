@@ -171,17 +171,17 @@ INLINE mask orbit_inside(vec point, mask active, int limit, orbit_record orbit, 
     return orbit_solid(point, active, limit, orbit, k).inside;
 }
 
-// The smooth escape count of one formula; 0 of a simple solid. `told`: of which lanes there is one.
-INLINE real smooth_of_one(orbit_end end, orbit_told one, mask *told, orbit_record orbit) {
+// The smooth escape count of one formula; 0 of a simple solid. `known`: of which lanes there is one.
+INLINE real smooth_of_one(orbit_end end, orbit_result one, mask *known, orbit_record orbit) {
     real smooth = R(0.0);
     end.count = one.count;
-    *told = end.inside & ~end.inside;
+    *known = end.inside & ~end.inside;
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
         const mask here = equal(one.of, (real)((scalar)i));
         if (o->kind != SOLID_FORMULA || !any_lane(here)) continue;
         smooth = pick(here, formula_smooth_count(end, one, o), smooth);
-        *told |= here;
+        *known |= here;
     }
     return smooth;
 }
@@ -189,13 +189,13 @@ INLINE real smooth_of_one(orbit_end end, orbit_told one, mask *told, orbit_recor
 // The smooth escape count of the formula that is nearest; where two flow together, between theirs.
 INLINE real smooth_count(orbit_end end, surface_point surface, orbit_record orbit) {
     if (!JOINED) return formula_smooth_count(end, surface.own, orbit);
-    mask told;
-    const real own = smooth_of_one(end, surface.own, &told, orbit);
+    mask known;
+    const real own = smooth_of_one(end, surface.own, &known, orbit);
     const mask flows = less(R(0.0), surface.share);
     if (!any_lane(flows)) return own;
-    mask other_told;
-    const real other = smooth_of_one(end, surface.other, &other_told, orbit);
-    return shared(own, other, flows & told, flows & other_told, surface.share);
+    mask other_known;
+    const real other = smooth_of_one(end, surface.other, &other_known, orbit);
+    return shared(own, other, flows & known, flows & other_known, surface.share);
 }
 
 // The potential of the formula that is nearest, as if its ball were as large as the whole scene's; 0 on walls.

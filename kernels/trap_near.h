@@ -38,7 +38,7 @@ INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, co
     surface_point nearest;
     solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &nearest);
     real found = (real)(REAL_LARGEST), other = found;
-    mask told = active & ~active, other_told = told;
+    mask known = active & ~active, other_known = known;
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
         const real number = (real)((scalar)i);
@@ -48,8 +48,8 @@ INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, co
         const real one = formula_near(near, solid_own(o, point), here | beside, o, k + o->first);
         found = pick(here, one, found);
         other = pick(beside, one, other);
-        told |= here;
-        other_told |= beside;
+        known |= here;
+        other_known |= beside;
     }
-    return shared(found, other, told, other_told, nearest.share);
+    return shared(found, other, known, other_known, nearest.share);
 }
