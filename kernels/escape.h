@@ -69,7 +69,7 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
         if (past_limit) break;
         // At the limit: inside, or on the way from the bailout to the distance bailout.
         if (HAS_SHAPE) inside |= alive & less_equal(solid_distance(z, k), R(0.0));
-        else inside |= smooth ? alive & settled(square, orbit) : alive;
+        else inside |= smooth ? alive & in_set(square, orbit) : alive;
         alive &= ~inside;
         limit = most + (orbit->longest - orbit->iterations);
     }

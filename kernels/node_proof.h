@@ -34,7 +34,7 @@ INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, con
     mask near = alive & ~alive;
     for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
         if (n % ORBIT_LOOK == ORBIT_LOOK - 1 && orbit_cancelled(orbit)) break;
-        if (n == orbit->iterations) near |= alive & settled(square, orbit);
+        if (n == orbit->iterations) near |= alive & in_set(square, orbit);
 #if HAS_DERIVATIVE
         near |= alive & doubtful(square, (reach * growth) * (reach * growth), orbit);
 #else
@@ -56,7 +56,7 @@ INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, con
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
-    if (orbit->longest <= orbit->iterations) near |= alive & settled(square, orbit);
+    if (orbit->longest <= orbit->iterations) near |= alive & in_set(square, orbit);
 #if !HAS_DERIVATIVE
     // The root of the largest sum of a row of |J^T J| is no less than J's largest singular value, and equal to it where the
     // map is conformal.

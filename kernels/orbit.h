@@ -35,7 +35,7 @@ INLINE real distance_from_growth(real square, real relative, real count, orbit_r
 }
 
 // Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
-INLINE mask settled(real square, orbit_record orbit) { return less_equal(square, (real)(orbit->bailout_square)); }
+INLINE mask in_set(real square, orbit_record orbit) { return less_equal(square, (real)(orbit->bailout_square)); }
 
 // What an orbit for a distance looks at after `look` applications: at the limit, which of its lanes are inside; before it, whether
 // the work was cancelled, which is the result.
@@ -44,7 +44,7 @@ INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, 
         *look = min(n + ORBIT_LOOK, orbit->iterations);
         return orbit_cancelled(orbit);
     }
-    *inside = *alive & settled(square, orbit);
+    *inside = *alive & in_set(square, orbit);
     *alive &= ~*inside;
     *look = INT_MAX;
     return 0;
@@ -97,7 +97,7 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_reco
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
-    alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & settled(square, orbit);
+    alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & in_set(square, orbit);
     return (orbit_end){count, alive};
 }
 
@@ -138,7 +138,7 @@ INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, orb
         count = pick(alive, (real)((scalar)(n + 1)), count);
         alive &= less_equal(square, (real)(orbit->distance_square));
     }
-    if (orbit->longest <= orbit->iterations) inside |= alive & settled(square, orbit);
+    if (orbit->longest <= orbit->iterations) inside |= alive & in_set(square, orbit);
     real distance;
     if (HAS_SHAPE) {
         // The last solid's distance in z, over how fast it changes per scene unit.
@@ -226,7 +226,7 @@ INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, orbit_record o
 // The distance by this derivative: |z| / g with g carried as one number.
 INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, orbit_record orbit, constants k) {
     mask inside = o->inside;
-    if (orbit->longest <= orbit->iterations) inside |= o->alive & settled(o->square, orbit);
+    if (orbit->longest <= orbit->iterations) inside |= o->alive & in_set(o->square, orbit);
     real distance;
     if (HAS_SHAPE) {
         const real solid = solid_distance(o->z, k);

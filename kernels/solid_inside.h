@@ -34,14 +34,14 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         look += CHUNK;
         if ((++looks & 1023) == 0 && orbit_cancelled(orbit)) break;
         if (!LOGARITHMIC) continue;
-        if (comparable && equal(apart_square(z, past), R(0.0)) && settled(square, orbit)) break;
+        if (comparable && equal(apart_square(z, past), R(0.0)) && in_set(square, orbit)) break;
         if (looks == renewed) {
             past = z;
             renewed *= 2;
             comparable = n + 1 >= REPEATS_FROM;
         }
     }
-    inside[0] = alive & settled(square, orbit);
+    inside[0] = alive & in_set(square, orbit);
 }
 #else
 INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
@@ -80,7 +80,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         #pragma unroll
         for (int p = 0; p < TURNS(PACKETS); ++p) {
             if (LOGARITHMIC && comparable) {
-                periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & settled(square[p], orbit);
+                periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & in_set(square[p], orbit);
             }
             if (LOGARITHMIC && chunks == renewed) past[p] = z[p];
             open |= alive[p] & ~periodic[p];
@@ -101,7 +101,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         }
     }
     #pragma unroll
-    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = periodic[p] | (alive[p] & settled(square[p], orbit));
+    for (int p = 0; p < TURNS(PACKETS); ++p) inside[p] = periodic[p] | (alive[p] & in_set(square[p], orbit));
 }
 #endif
 

@@ -190,10 +190,10 @@ def _dual_orbit(
     for application in range(iterations + extra):
         if application >= iterations:
             # Only points that have left the bailout go on.
-            settled = alive & (_norm([z.value for z in state]) <= chain.bailout)
+            in_set = alive & (_norm([z.value for z in state]) <= chain.bailout)
             if application == iterations:
-                inside = settled
-            alive &= ~settled & (chain.degree > 1)
+                inside = in_set
+            alive &= ~in_set & (chain.degree > 1)
         if application <= iterations:
             shown = state
         if not alive.any():
