@@ -28,8 +28,7 @@ def plain(value: Any) -> Any:
     if type(value) is tuple:
         return tuple(plain(each) for each in value)
     # Arrays and single numbers of NumPy both have it; NumPy is not loaded for asking.
-    convert = getattr(value, "tolist", None)
-    return convert() if callable(convert) and not isinstance(value, type) else value
+    return value.tolist() if hasattr(type(value), "tolist") else value
 
 
 def refuse(name: str, allowed: str, value: Any, error: Kind = SceneError) -> NoReturn:

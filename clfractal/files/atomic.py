@@ -22,7 +22,7 @@ PICTURES = (".exr", ".png", ".jpg", ".jpeg", ".webp")
 """Extensions of the picture formats that can be written, in lower case."""
 
 
-def file_error(path: str | Path, what: str, error: Exception | str = "") -> FileError:
+def file_error(path: str | Path, what: str, error: Exception | str) -> FileError:
     """One line such as `out.exr: cannot be written: No space left on device`."""
     reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
     if isinstance(error, OSError) and error.errno == errno.EFBIG:
@@ -57,24 +57,25 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
         raise file_error(
             path,
             f"unknown extension {suffix!r}; known: {known}" if suffix else f"needs an extension: {known}",
+            "",
         )
     try:
         target = _target(path)
         if target.is_symlink():
-            raise file_error(path, "cannot be written: it is a link that leads to itself")
+            raise file_error(path, "cannot be written: it is a link that leads to itself", "")
         # Of a link, the folder of the file that it leads to.
         folder = str(target.parent if shown.is_symlink() else shown.parent)
         if not target.parent.exists():
-            raise file_error(path, f"cannot be written: there is no folder {folder!r}")
+            raise file_error(path, f"cannot be written: there is no folder {folder!r}", "")
         if not target.parent.is_dir():
-            raise file_error(path, f"cannot be written: {folder!r} is not a folder")
+            raise file_error(path, f"cannot be written: {folder!r} is not a folder", "")
         if target.is_dir():
-            raise file_error(path, "cannot be written: it is a folder")
+            raise file_error(path, "cannot be written: it is a folder", "")
         if target.exists():
             if not target.is_file():
-                raise file_error(path, "cannot be written: it is not a regular file")
+                raise file_error(path, "cannot be written: it is not a regular file", "")
             if not os.access(target, os.W_OK):
-                raise file_error(path, "cannot be written: it is write-protected")
+                raise file_error(path, "cannot be written: it is write-protected", "")
         # Access rights, read-only file systems, quotas: only an attempt to write tests all of them.
         descriptor, beside = _open_beside(target)
         os.close(descriptor)
@@ -132,9 +133,9 @@ def reading(path: str | Path) -> Iterator[BinaryIO]:
         except OSError as error:
             raise file_error(path, "cannot be read", error) from error
         except MemoryError as error:
-            raise file_error(path, "is too large: out of memory") from error
+            raise file_error(path, "is too large: out of memory", "") from error
         except ContentError as error:
-            raise file_error(path, str(error)) from error.__cause__
+            raise file_error(path, str(error), "") from error.__cause__
 
 
 def open_regular(path: str | Path) -> BinaryIO:
@@ -152,4 +153,4 @@ def open_regular(path: str | Path) -> BinaryIO:
         os.close(descriptor)
     except (OSError, ValueError) as error:
         raise file_error(path, "cannot be read", error) from error
-    raise file_error(path, "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file")
+    raise file_error(path, "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file", "")

@@ -99,7 +99,7 @@ def read_exr(path: str | Path, *, tiles: bool = False) -> tuple[dict[str, npt.ND
     header = read_header(path)
     if not (header.one_part_flat if tiles else header.one_part_scanlines):
         kinds = "several parts or deep pixels" if tiles else "tiles, several parts or deep pixels"
-        raise file_error(path, f"holds {kinds}, which are not read")
+        raise file_error(path, f"holds {kinds}, which are not read", "")
     try:
         # For pixels that cannot be read the library only prints a line, on Python's standard output.
         with (
@@ -240,7 +240,9 @@ def _replace_attributes(path: str | Path, beside: Path, attributes: Mapping[str,
     try:
         header = read_header(beside)
     except FileError as error:
-        raise file_error(path, "cannot be written: the library left it incomplete (disk full?)") from error
+        raise file_error(
+            path, "cannot be written: the library left it incomplete (disk full?)", ""
+        ) from error
     with open(beside, "r+b") as stream:
         for name, (kind, data) in attributes.items():
             record = f"{name}\0{kind}\0".encode() + struct.pack("<i", len(data)) + data

@@ -127,7 +127,7 @@ def read_scene_text(path: str | Path) -> str | None:
     try:
         return attribute.data.decode()
     except UnicodeDecodeError:
-        raise file_error(path, "is damaged: its scene is not UTF-8 text") from None
+        raise file_error(path, "is damaged: its scene is not UTF-8 text", "") from None
 
 
 def _exactly(stream: BinaryIO, size: int) -> bytes:

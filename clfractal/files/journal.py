@@ -87,7 +87,7 @@ class Journal:
             earlier = _open_locked(target)
             try:
                 if not stat.S_ISREG(os.fstat(earlier).st_mode) or system.read_at(earlier, 8, 0) != MAGIC:
-                    raise file_error(target, "is in the way and holds no work in progress; move it away")
+                    raise file_error(target, "is in the way and holds no work in progress; move it away", "")
             finally:
                 os.close(earlier)
         if tile_count >= 1 << _INDEX_BITS:
@@ -219,7 +219,7 @@ class Journal:
         except OSError as error:
             raise file_error(self.path, "cannot be read", error) from error
         if found is None or found[0] % (1 << _INDEX_BITS) != tile_index:
-            raise file_error(self.path, f"is damaged: tile {tile_index} has changed since it was written")
+            raise file_error(self.path, f"is damaged: tile {tile_index} has changed since it was written", "")
         return found[1].reshape(len(self.channels), SIDE, SIDE)
 
     def close(self) -> None:
@@ -311,7 +311,7 @@ def _open_locked(path: Path) -> int:
         system.lock(descriptor)
     except system.HeldError as error:
         os.close(descriptor)
-        raise file_error(path, "is in use: another process renders this picture") from error
+        raise file_error(path, "is in use: another process renders this picture", "") from error
     except OSError:
         pass  # a file system without locks: nothing can be said
     return descriptor
@@ -325,7 +325,7 @@ def _identity_text(identity: Mapping[str, Any], channels: Sequence[str], tile_co
 def _check_identity(path: Path, descriptor: int, wanted: Sequence[bytes]) -> int:
     """Where the records of a journal begin; FileError if it is another one's."""
     head = system.read_at(descriptor, _HEAD.size, 0)
-    not_one = file_error(path, "holds no work in progress that could be resumed")
+    not_one = file_error(path, "holds no work in progress that could be resumed", "")
     if len(head) < _HEAD.size or head[:8] != MAGIC:
         raise not_one
     _, length, check = _HEAD.unpack(head)

@@ -87,13 +87,13 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
         ".glb": _write_glb,
     }
     if suffix not in writers:
-        raise file_error(path, f"unknown extension {suffix!r}; known: {', '.join(EXTENSIONS)}")
+        raise file_error(path, f"unknown extension {suffix!r}; known: {', '.join(EXTENSIONS)}", "")
     if not len(mesh.triangles):
-        raise file_error(path, "cannot be written: the mesh has no triangle")
+        raise file_error(path, "cannot be written: the mesh has no triangle", "")
     if suffix in SINGLE_PRECISION and _is_fine(mesh):
-        raise file_error(path, f"cannot be written: {TOO_FINE}")
+        raise file_error(path, f"cannot be written: {TOO_FINE}", "")
     if suffix == ".glb" and _glb_length(mesh) + 65_536 + 4 * len(mesh.text) > _LARGEST_GLB:
-        raise file_error(path, "cannot be written: the mesh is too large for GLB, which ends at 4 GB")
+        raise file_error(path, "cannot be written: the mesh is too large for GLB, which ends at 4 GB", "")
     with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
         writers[suffix](stream, mesh, mesh.text)
 

@@ -204,7 +204,7 @@ def write_slabs(
 def _format(path: str | Path) -> Format:
     suffix = Path(path).suffix.lower()
     if suffix not in EXTENSIONS:
-        raise file_error(path, f"unknown extension {suffix!r}; known: {', '.join(EXTENSIONS)}")
+        raise file_error(path, f"unknown extension {suffix!r}; known: {', '.join(EXTENSIONS)}", "")
     return "npy" if suffix == ".npy" else "nrrd"
 
 
@@ -316,14 +316,14 @@ def _notes(path: str | Path, shape: tuple[int, ...]) -> tuple[Doubles, Doubles, 
         raise
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError, OverflowError) as error:
         raise file_error(
-            beside, "does not say where the voxels are: needs shape, origin, directions"
+            beside, "does not say where the voxels are: needs shape, origin, directions", ""
         ) from error
     if sides != shape:
-        raise file_error(beside, f"is for another array: {sides!r:.60}, not {shape!r}")
+        raise file_error(beside, f"is for another array: {sides!r:.60}, not {shape!r}", "")
     numbers = np.concatenate([origin.reshape(-1), directions.reshape(-1)])
     fits = origin.shape == (3,) and directions.shape == (3, 3)
     if not fits or not np.isfinite(numbers).all() or np.abs(numbers).max() > nrrd.LARGEST_NUMBER:
-        raise file_error(beside, "must have an origin of 3 numbers and directions of 3 x 3")
+        raise file_error(beside, "must have an origin of 3 numbers and directions of 3 x 3", "")
     if not nrrd.independent(directions):
-        raise file_error(beside, "must have directions that are not zero and not equal")
+        raise file_error(beside, "must have directions that are not zero and not equal", "")
     return origin, directions, texts

@@ -20,7 +20,6 @@ from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
 from clfractal.scene.objects import FormulaObject
 from clfractal.scene.parts import OrthographicCamera
-from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 from clfractal.schema.base import Vector
@@ -37,33 +36,13 @@ _MOST_APPLICATIONS = 2_000
 
 
 def check_parts(scene: Scene, *, whole: bool = True) -> None:
-    """Raises SceneError, with a dotted path, if values contradict each other; `whole` is false for a layout's view."""
-    radius = scene.bounds[1]
-    _check_step(scene.coloring.step, radius, "coloring.step")
-    if isinstance(scene.renderer, SurfaceRenderer):
-        _check_step(scene.renderer.step, radius, "renderer.step")
-        _check_residual(scene, scene.renderer)
-    if isinstance(scene.renderer, VolumeRenderer):
-        _check_volume(scene, scene.renderer)
-    _check_planes(scene)
-    if scene.glow is not None and not isinstance(scene.renderer, SurfaceRenderer):
-        raise SceneError(
-            f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
-        )
-    check_lighting(scene)
-    check_objects(scene)
-    if scene.layout is None:
-        check_layers(scene, scene.output.channels, "output.channels")
-    if scene.stereo is not None:
-        _check_eyes(scene)
-        if whole:
-            _check_stereo(scene, scene.stereo)
-    if scene.layout is not None:
-        _check_views(scene)
-    if not (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
-        # (A grid from a file is not the formula's solid, so its lights may be anywhere.)
-        _check_lights(scene)
-    _check_places(scene)
+    """Raises SceneError, with a dotted path, if values contradict each other; `whole` is false for a layout's view.
+
+    What has passed is checked again only where a section changed that it reads: see `Scene.derived`.
+    """
+    for check in _PARTS:
+        if whole or check is not _check_stereo:
+            scene.derived(check)
 
 
 def _check_places(scene: Scene) -> None:
@@ -104,7 +83,30 @@ def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
             )
 
 
-def _check_volume(scene: Scene, renderer: VolumeRenderer) -> None:
+def _check_steps(scene: Scene) -> None:
+    radius = scene.bounds[1]
+    _check_step(scene.coloring.step, radius, "coloring.step")
+    if isinstance(scene.renderer, SurfaceRenderer):
+        _check_step(scene.renderer.step, radius, "renderer.step")
+        _check_residual(scene, scene.renderer)
+
+
+def _check_glow(scene: Scene) -> None:
+    if scene.glow is not None and not isinstance(scene.renderer, SurfaceRenderer):
+        raise SceneError(
+            f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
+        )
+
+
+def _check_channels(scene: Scene) -> None:
+    if scene.layout is None:
+        check_layers(scene, scene.output.channels, "output.channels")
+
+
+def _check_volume(scene: Scene) -> None:
+    renderer = scene.renderer
+    if not isinstance(renderer, VolumeRenderer):
+        return
     used_boxes(scene, renderer)
     if renderer.file is not None and renderer.zoom:
         raise SceneError(
@@ -151,7 +153,9 @@ def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
 def _check_eyes(scene: Scene) -> None:
     """A pair needs a perspective camera, except for the flat picture of a cut_plane renderer."""
     flat = isinstance(scene.renderer, CutPlaneRenderer)
-    if isinstance(scene.camera, OrthographicCamera) and not flat and scene.layout is None:
+    if scene.stereo is None or flat or scene.layout is not None:
+        return
+    if isinstance(scene.camera, OrthographicCamera):
         raise SceneError(
             "must be perspective with stereo: parallel rays look the same to both eyes; use"
             " {projection: perspective, position, target, fov}, or remove stereo",
@@ -159,8 +163,11 @@ def _check_eyes(scene: Scene) -> None:
         )
 
 
-def _check_stereo(scene: Scene, stereo: Stereo) -> None:
+def _check_stereo(scene: Scene) -> None:
     """Squeezed pictures need an even side, anaglyphs need colours, and `fit` needs one view with depth."""
+    stereo = scene.stereo
+    if stereo is None:
+        return
     squeezed = {"split_half": "width", "over_under_half": "height"}.get(stereo.mode)
     if squeezed is not None:
         side = getattr(scene.image, squeezed)
@@ -204,6 +211,8 @@ def _check_step(step: float | None, radius: float, path: str) -> None:
 
 def _check_views(scene: Scene) -> None:
     """Checks every view as a scene of its own."""
+    if scene.layout is None:
+        return
     for number, (view, _) in enumerate(scene.views):
         try:
             check_parts(view, whole=False)
@@ -282,6 +291,9 @@ def _check_medium(scene: Scene, renderer: VolumeRenderer) -> None:
 
 
 def _check_lights(scene: Scene) -> None:
+    """A grid from a file is not the formula's solid, so there lights may be anywhere."""
+    if isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None:
+        return
     center, radius = scene.bounds
     candidates = [
         (index, light.position)
@@ -332,3 +344,20 @@ def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -
         # The last solid is the shape, which is smaller than the ball of the bailout.
         inside &= reference.distance(chain, array, iterations)[0] == 0
     return [bool(each) for each in inside]
+
+
+# In this order: of several mistakes the first one is told.
+_PARTS = (
+    _check_steps,
+    _check_volume,
+    _check_planes,
+    _check_glow,
+    check_lighting,
+    check_objects,
+    _check_channels,
+    _check_eyes,
+    _check_stereo,
+    _check_views,
+    _check_lights,
+    _check_places,
+)

@@ -233,15 +233,21 @@ def _defaults() -> dict[str, Any]:
 
 def check_scene(scene: Scene) -> None:
     """Raises ClfractalError, at a dotted path, for mistakes that the schema cannot find; files are kept with the scene."""
-    _ = scene.chain, scene.joined_chains
+    scene.derived(_check_formulas)
     check_parts(scene)
-    _check_names(scene)
-    if scene.layout is not None:
-        _check_views(scene)
+    for check in (*_NAMES, _check_views, _check_movement):
+        scene.derived(check)
+
+
+def _check_formulas(scene: Scene) -> None:
+    _ = scene.chain, scene.joined_chains
+
+
+def _check_movement(scene: Scene) -> None:
     if scene.animation is not None:
         from clfractal.scene.movement import movement_of
 
-        movement_of(scene).check(check_parts)
+        movement_of(scene.whole()).check(check_parts)
 
 
 def _at_own_frame(scene: Scene) -> Scene:
@@ -253,18 +259,16 @@ def _at_own_frame(scene: Scene) -> Scene:
     return movement_of(scene).still(scene.animation.frame)
 
 
-def _check_names(scene: Scene) -> None:
-    """Raises SceneError or FileError if a palette, an environment or a file that the scene names does not exist.
-
-    The data are kept in the scene, so that exactly the checked data are rendered.
-    """
-    _check_palettes(scene)
+def _check_environment(scene: Scene) -> None:
     if scene.environment is not None:
         from clfractal.scene.environment import check_name
 
         check_name(scene.environment)
         if scene.environment.file is not None:
             _ = scene.surroundings
+
+
+def _check_files(scene: Scene) -> None:
     _ = scene.given
     _ = scene.textures
     if any(isinstance(each, VolumeObject) for each in scene.objects.values()):
@@ -274,10 +278,11 @@ def _check_names(scene: Scene) -> None:
 
 
 def _check_views(scene: Scene) -> None:
-    """The same of each view of its layout."""
-    for number, (view, _) in enumerate(scene.views):
+    """What each view of its layout names."""
+    for number, (view, _) in enumerate(scene.views if scene.layout is not None else ()):
         try:
-            _check_names(view)
+            for check in _NAMES:
+                view.derived(check)
         except (SceneError, FileError) as error:
             where = replace(error.where, path=f"layout.views.{number}.{error.where.path}")
             raise type(error)(error.message, where, details=error.details) from error
@@ -306,3 +311,8 @@ def _check_palettes(scene: Scene) -> None:
 
         for path, palette in used:
             check_palette(palette, path)
+
+
+# Palettes, environments and files that the scene names exist; their data are kept in the scene, so that exactly the checked
+# data are rendered.
+_NAMES = (_check_palettes, _check_environment, _check_files)

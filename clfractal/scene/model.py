@@ -6,10 +6,11 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar
+from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
-from pydantic import Field, PrivateAttr, ValidationInfo, model_validator
+from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, model_validator
 
+from clfractal.arguments import plain
 from clfractal.errors import ClfractalError
 from clfractal.files.inputs import noting
 from clfractal.scene.animation import Animation
@@ -24,13 +25,14 @@ from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
 from clfractal.scene.objects import FormulaObject, Objects, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
+from clfractal.scene.reads import Reads, is_data, is_table, section_of
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.scene.words import with_words
-from clfractal.schema.base import Section, Vector
+from clfractal.schema.base import Section, Vector, own_errors
 from clfractal.schema.shape import Joined, Solid
 
 if TYPE_CHECKING:
@@ -41,6 +43,11 @@ if TYPE_CHECKING:
 
 
 T = TypeVar("T")
+# In a validator's context: sections are replaced one by one, and cameras get their places when all have been.
+_PART = "part"
+
+# In a validator's context: sections are replaced one by one, and cameras get their places when all have been.
+_PART = "part"
 
 # Data that a scene has read or resolved, and the section that they depend on.
 _SECTIONS = {
@@ -53,22 +60,11 @@ _SECTIONS = {
 }
 
 
-TABLE = "table "
-"""What the names of tables begin with, under which a scene keeps them."""
-
-
-def _is_data(name: str) -> bool:
-    """Whether what a scene keeps under a name are data that were read, rather than what can be found again."""
-    return name in _SECTIONS or name.startswith(TABLE)
-
-
-def _section_of(name: str) -> str:
-    """The section that names these data."""
-    return _SECTIONS.get(name, "animation")
-
-
 class Scene(Section):
     """A picture to be made: a formula, a camera, a renderer and everything else that determines the pixels."""
+
+    # Else pydantic would not check single values of a copy; setting them is refused by every section.
+    model_config = ConfigDict(frozen=False)
 
     version: Literal[1] = Field(description="version of this schema")
     formula: FormulaSpec
@@ -103,6 +99,7 @@ class Scene(Section):
     _folder: Path = PrivateAttr(default_factory=Path)
     _read: dict[str, Any] = PrivateAttr(default_factory=dict)
     _files: tuple[Path, ...] = PrivateAttr(default=())
+    _derived: dict[Callable[..., Any], tuple[dict[str, Any], Any]] = PrivateAttr(default_factory=dict)
 
     def __eq__(self, other: object) -> bool:
         """Whether both have equal values, wherever they were loaded from."""
@@ -117,17 +114,23 @@ class Scene(Section):
 
         What is shown may stand in a file: the context tells where that is looked for.
         """
-        self._folder = (info.context or {}).get("folder", self._folder)
+        if info.context is not None:
+            self._folder = info.context.get("folder", self._folder)
+        if _PART not in (info.context or ()):
+            self._frame()
+        return self
+
+    def _frame(self) -> None:
         views = self.layout.views if self.layout is not None else ()
         own = [view.camera for view in views if view.camera is not None]
         if all(camera.frame is None for camera in (self.camera, *own, *self.bookmarks.values())):
-            return self
+            return
         try:
             seen = [view for view, _ in self.views] if self.layout is not None else []
             self._settle(camera=self._framed(self.camera))
             self._settle(bookmarks={name: self._framed(each) for name, each in self.bookmarks.items()})
         except ClfractalError:
-            return self  # told by the checks that follow
+            return  # told by the checks that follow
         finally:
             self._read.pop("views", None)
         if self.layout is not None:
@@ -137,7 +140,6 @@ class Scene(Section):
                 for view, scene in zip(views, seen, strict=True)
             ]
             self._settle(layout=self.layout.model_copy(update={"views": placed}))
-        return self
 
     def _framed(self, camera: AnyCamera) -> AnyCamera:
         if camera.frame is None:
@@ -222,27 +224,38 @@ class Scene(Section):
         copied = super().model_copy()
         copied._folder = folder
         copied._read = {name: self._read[name] for name in ("chain", "joined_chains") if name in self._read}
+        copied._derived = {}
         return copied
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:
-        """As for every section; the copy keeps the scene's folder.
+        """As for every section; only what is in `update` is checked, and the copy keeps the scene's folder.
 
         Files of sections that are not replaced are not read again: the copy keeps the checked data.
         """
-        copied = super().model_copy(update=update, deep=deep)
-        copied._folder, copied._files = self._folder, self._files
+        update = plain(update or {})
+        if not update.keys() <= type(self).model_fields.keys():
+            return super().model_copy(update=update)  # which refuses it
+        copied = BaseModel.model_copy(self, deep=deep)
+        copied._derived = dict(self._derived)
         copied._read = {
             name: found
             for name, found in self._read.items()
-            if _is_data(name) and _section_of(name) not in (update or ())
+            if is_data(name) and section_of(name) not in update
         }
-        if "materials" in (update or ()) and "textures" in self._read:
+        with own_errors(type(self)):
+            for name in type(self).model_fields:
+                if name in update:
+                    self.__pydantic_validator__.validate_assignment(
+                        copied, name, update[name], context={"folder": self._folder, _PART: True}
+                    )
+        copied._frame()
+        if "materials" in update and "textures" in self._read:
             from clfractal.scene.textures import texture_files
 
             # Other values of materials, as of each frame of a film, show the same pictures.
             if set(texture_files(copied.materials)) <= set(self._read["textures"]):
                 copied._read["textures"] = self._read["textures"]
-        if "objects" in (update or ()) and "grids" in self._read:
+        if "objects" in update and "grids" in self._read:
             from clfractal.scene.object_grids import grid_files
 
             if set(grid_files(copied.objects)) <= set(self._read["grids"]):
@@ -253,11 +266,9 @@ class Scene(Section):
         """A scene is sent with the data that were read for it, and without what follows from it."""
         state = super().__getstate__()
         private = dict(state["__pydantic_private__"] or {})
-        private["_read"] = {name: found for name, found in self._read.items() if _is_data(name)}
+        private["_read"] = {name: found for name, found in self._read.items() if is_data(name)}
+        private["_derived"] = {}
         return {**state, "__pydantic_private__": private}
-
-    def _context(self) -> dict[str, Any]:
-        return {"folder": self._folder}
 
     def once(self, name: str, read: Callable[[], T]) -> T:
         """The data kept under a name, which follow from the scene; they are made first if there are none."""
@@ -268,9 +279,29 @@ class Scene(Section):
         found: T = self._read[name]
         return found
 
+    def derived(self, make: "Callable[[Scene], T]") -> T:
+        """What `make` gives, which looks at nothing but a scene: made anew only if a section has changed that it read.
+
+        So a check that has passed passes in a copy, too, whose other sections have changed.
+        """
+        known, present = self._derived.get(make), self.__dict__
+        if known is None or any(present[name] is not section for name, section in known[0].items()):
+            read = _Reads(self)
+            known = self._derived[make] = (read.sections, make(cast(Scene, read)))
+        found: T = known[1]
+        return found
+
+    def read_by(self, make: "Callable[[Scene], Any]") -> Mapping[str, Any]:
+        """The sections that `make` has read when it was `derived`."""
+        return self._derived[make][0]
+
+    def whole(self) -> Self:
+        """The scene itself, for what may look at all of its sections."""
+        return self
+
     def take_tables(self, other: Self) -> None:
         """Keeps the tables of another scene with the same tracks, so that their files need not be there."""
-        self._read |= {name: found for name, found in other._read.items() if name.startswith(TABLE)}
+        self._read |= {name: found for name, found in other._read.items() if is_table(name)}
 
     @property
     def chain(self) -> "Chain":
@@ -414,3 +445,7 @@ class Scene(Section):
         if self.animation is not None:
             with_words(plain, self, self.animation.tracks)
         return plain
+
+
+class _Reads(Reads):
+    model_fields = Scene.model_fields

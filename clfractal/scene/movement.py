@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import replace
 from math import isfinite
-from typing import Any
+from typing import Any, TypeAlias
 
 from clfractal.errors import ClfractalError, FormulaError, SceneError, Where
 from clfractal.scene.animation import Animation
@@ -11,7 +11,7 @@ from clfractal.scene.curves import Values
 from clfractal.scene.model import Scene
 from clfractal.scene.movers import Mover, Movers
 from clfractal.scene.renderer import Renderer
-from clfractal.scene.tracks import target_of, with_values
+from clfractal.scene.tracks import Target, target_of, with_values
 
 
 class Movement:
@@ -24,10 +24,9 @@ class Movement:
     def __init__(self, scene: Scene) -> None:
         assert scene.animation is not None
         self.animation: Animation = scene.animation
-        self.targets = {name: _placed(name, target_of, scene, name) for name in self.animation.tracks}
+        self.targets, self.movers = scene.derived(_movers_of)
         self._original = scene
         self._scene = with_values(scene, {}, animation=None)
-        self.movers = Movers(scene, self.animation, self.targets).made()
 
     def values(self, frame: float) -> dict[str, Any]:
         """The value of each track at a frame; after the end of a film that begins again, those of its beginning."""
@@ -112,25 +111,36 @@ class Movement:
 
     def check(self, check_parts: Callable[[Scene], None]) -> None:
         """Raises ClfractalError if a frame's scene is wrong: every frame at which one of the values is extreme is tried."""
-        tried: set[float] = {0, self.animation.count - 1}
-        for mover in self.movers:
-            tried |= self._extremes(mover)
-        for frame in sorted(tried):
+        for frame in self._original.derived(_extreme_frames):
             found = self.scene(frame)
             try:
                 check_parts(found)
             except ClfractalError as error:
                 raise self._blamed(error, frame) from error
 
-    def _extremes(self, mover: Mover) -> set[float]:
-        """The times with the least and the largest of each component.
 
-        Raises:
-            FormulaError: a value is no finite number.
-        """
-        found: set[float] = set()
+Moved: TypeAlias = tuple[dict[str, Target], tuple[Mover, ...]]
+
+
+def _movers_of(scene: Scene) -> Moved:
+    """What a scene's tracks move, and how."""
+    assert scene.animation is not None
+    targets = {name: _placed(name, target_of, scene, name) for name in scene.animation.tracks}
+    return targets, Movers(scene, scene.animation, targets).made()
+
+
+def _extreme_frames(scene: Scene) -> list[float]:
+    """The first frame and the last, and those with the least and the largest of each component.
+
+    Raises:
+        FormulaError: a value is no finite number.
+    """
+    animation = scene.animation
+    assert animation is not None
+    found: set[float] = {0, animation.count - 1}
+    times = _times(animation)
+    for mover in scene.derived(_movers_of)[1]:
         columns: list[Values] = []
-        times = self._times()
         for time in times:
             values = mover.at(time)
             if not all(isfinite(value) for value in values):
@@ -142,16 +152,17 @@ class Movement:
             found |= set(
                 {round(values[0]): time for time, values in zip(times, columns, strict=True)}.values()
             )
-        return found
+    return sorted(found)
 
-    def _times(self) -> list[float]:
-        """Every frame, and while its shutter is open the middle and the end of that."""
-        count, shutter = self.animation.count, self.animation.shutter
-        if shutter == 0:
-            return [float(frame) for frame in range(count)]
-        shares = (0.0, 0.5 * shutter, shutter)
-        times = (frame + share for frame in range(count) for share in shares)
-        return [time % count if self.animation.loop else min(time, count - 1.0) for time in times]
+
+def _times(animation: Animation) -> list[float]:
+    """Every frame, and while its shutter is open the middle and the end of that."""
+    count, shutter = animation.count, animation.shutter
+    if shutter == 0:
+        return [float(frame) for frame in range(count)]
+    shares = (0.0, 0.5 * shutter, shutter)
+    times = (frame + share for frame in range(count) for share in shares)
+    return [time % count if animation.loop else min(time, count - 1.0) for time in times]
 
 
 def movement_of(scene: Scene) -> Movement:

@@ -24,7 +24,8 @@ from clfractal.scene.curves import (
     unit,
 )
 from clfractal.scene.flight import Around, Distance, EvenTarget
-from clfractal.scene.model import TABLE, Scene
+from clfractal.scene.model import Scene
+from clfractal.scene.reads import TABLE
 from clfractal.scene.tracks import Target, is_camera_place
 
 At: TypeAlias = Callable[[float], Values]

@@ -16,7 +16,6 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     ValidationError,
-    model_validator,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -56,12 +55,12 @@ class _Kind(ModelMetaclass):
     if not TYPE_CHECKING:
 
         def __call__(self, *arguments: Any, **values: Any) -> Any:
-            with _own_errors(self):
-                return super().__call__(*arguments, **values)
+            with own_errors(self):
+                return super().__call__(*arguments, **plain(values))
 
 
 @contextmanager
-def _own_errors(cls: Any) -> Iterator[None]:
+def own_errors(cls: Any) -> Iterator[None]:
     """Raises SceneError, with a path, where a section is refused."""
     try:
         yield
@@ -74,7 +73,7 @@ def _own_errors(cls: Any) -> Iterator[None]:
 
 
 # Names of sections that are no part of the Python API.
-_FOR_OURSELVES = frozenset({"checked", "note_files", "once", "placed", "tag"})
+_FOR_OURSELVES = frozenset({"checked", "derived", "note_files", "once", "placed", "read_by", "tag", "whole"})
 
 
 class Section(BaseModel, metaclass=_Kind):
@@ -104,15 +103,11 @@ class Section(BaseModel, metaclass=_Kind):
         if not update:
             return super().model_copy(deep=deep)
         values = {name: getattr(self, name) for name in type(self).model_fields}
-        return self.checked({**values, **update}, self._context())
+        return self.checked({**values, **update})
 
     def __hash__(self) -> int:
         """Equal sections have equal hashes; lists and mappings in them count by their values."""
         return hash((type(self), *(_hashable(getattr(self, name)) for name in type(self).model_fields)))
-
-    def _context(self) -> dict[str, Any]:
-        """What the checks of a copy's values have to know."""
-        return {}
 
     @classmethod
     def checked(cls, values: Mapping[str, Any], context: Mapping[str, Any] | None = None) -> Self:
@@ -121,8 +116,12 @@ class Section(BaseModel, metaclass=_Kind):
         Raises:
             SceneError: a value is wrong; the path says which.
         """
-        with _own_errors(cls):
-            return cls.model_validate(values, context=dict(context or {}))
+        with own_errors(cls):
+            return cls.model_validate(plain(values), context=dict(context or {}))
+
+    def __delattr__(self, name: str) -> None:
+        """Nothing is deleted."""
+        raise SceneError("cannot be deleted", Where(path=name))
 
     def __setattr__(self, name: str, value: Any) -> None:
         """Only what is derived may be set; values change in a copy."""
@@ -132,12 +131,6 @@ class Section(BaseModel, metaclass=_Kind):
                 Where(path=name),
             )
         super().__setattr__(name, value)
-
-    @model_validator(mode="before")
-    @classmethod
-    def _with_plain_numbers(cls, values: Any) -> Any:
-        """NumPy's numbers are taken wherever numbers are."""
-        return plain(values) if isinstance(values, dict) else values
 
     def _settle(self, **values: Any) -> None:
         """For validators: replaces values of the section that is being made; they count as given.

@@ -2,19 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
-from itertools import pairwise
 from typing import Any
 
-from pydantic import ValidationError
-
 from clfractal.errors import SceneError, Where
-from clfractal.files.marks import Document, node_from_plain
-from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
-from clfractal.schema.messages import first_error
+from clfractal.schema.base import Section
 from clfractal.viewer.tracked import check_tracked
 
 
@@ -65,14 +60,8 @@ def edited(scene: Scene, values: Mapping[str, Any]) -> Scene:
         first, *parts = path.split(".")
         if first not in Scene.model_fields:
             raise SceneError("there is no such key", Where(path=path))
-        if first not in sections:
-            sections[first] = plain_section(scene, first)
-        if not parts:
-            sections[first] = value
-        else:
-            if sections[first] is None:
-                sections[first] = {}
-            _put(sections[first], parts, value, path)
+        present = sections[first] if first in sections else getattr(scene, first)
+        sections[first] = _changed({} if parts and present is None else present, parts, value, path)
     return replaced(scene, sections)
 
 
@@ -82,51 +71,39 @@ def replaced(scene: Scene, sections: Mapping[str, Any]) -> Scene:
     Raises:
         SceneError, FormulaError, FileError: they are wrong, or do not fit the others.
     """
-    fields: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
-    try:
-        checked = Scene.model_validate({**fields, **sections}, context={"folder": scene.folder})
-    except ValidationError as error:
-        plain = {
-            name: _plain(value) if not isinstance(value, FormulaSpec) else value.mapping()
-            for name, value in sections.items()
-        }
-        document = Document(node_from_plain({**scene.resolved(), **plain}, None))
-        raise first_error(error, document, Scene) from error
-    result = scene.model_copy(update={name: getattr(checked, name) for name in sections})
+    result = scene.model_copy(update=sections)
     if "animation" not in sections:
         check_tracked(scene, result)
     check_scene(result)
     return result
 
 
-def _put(value: Any, parts: list[str], new: Any, path: str) -> None:
-    for part, after in pairwise(parts):
-        made: Any = [] if after.isdecimal() else {}
-        value = _child(value, part, path, made)
-    last = parts[-1]
-    if isinstance(value, list):
-        index = _index(value, last, path, most=len(value))
-        value[index : index + 1] = [new]
-    elif isinstance(value, dict):
-        value[last] = new
-    else:
+def _changed(value: Any, parts: Sequence[str], new: Any, path: str) -> Any:
+    """A value with another one at a path: what is on the way is opened, to be checked again, and all else stays."""
+    if not parts:
+        return new
+    part, *rest = parts
+    if isinstance(value, (list, tuple)):
+        if not part.isdecimal() or int(part) > len(value) - bool(rest):
+            raise SceneError("there is no such entry", Where(path=path))
+        index = int(part)
+        entry = _changed(value[index] if rest else None, rest, new, path)
+        return [*value[:index], entry, *value[index + 1 :]]
+    opened = _keys(value) if isinstance(value, Section) else value
+    if not isinstance(opened, dict):
         raise SceneError("there is no such key", Where(path=path))
+    made: Any = [] if rest and rest[0].isdecimal() else {}
+    below = opened.get(part)
+    return {**opened, part: _changed(made if below is None else below, rest, new, path)}
 
 
-def _child(value: Any, part: str, path: str, made: Any) -> Any:
-    if isinstance(value, list):
-        return value[_index(value, part, path, most=len(value) - 1)]
-    if isinstance(value, dict):
-        if value.get(part) is None:
-            value[part] = made
-        return value[part]
-    raise SceneError("there is no such key", Where(path=path))
-
-
-def _index(value: list[Any], part: str, path: str, most: int) -> int:
-    if not part.isdecimal() or int(part) > most:
-        raise SceneError("there is no such entry", Where(path=path))
-    return int(part)
+def _keys(section: Section) -> dict[str, Any]:
+    """The values of a section, but those that others replace."""
+    return {
+        name: getattr(section, name)
+        for name, field in type(section).model_fields.items()
+        if not field.exclude
+    }
 
 
 @cache

@@ -118,6 +118,138 @@ def test_several_edits_at_once_are_as_set(paths: dict[str, None], data: st.DataO
         check(scene, "mandelbulb", values)
 
 
+# Of a scene that has most things, so that most checks across sections have something to say.
+RICH: dict[str, Any] = {
+    "version": 1,
+    "formula": {"name": "mandelbulb", "iterations": 6},
+    "camera": {"position": [0, -3, 0.5]},
+    "lights": [{"type": "point", "position": [0.5, -2, 1]}, {"direction": [1, 1, -1]}],
+    "materials": {"gold": {"base": {"metalness": 1}}, "glass": {"transmission": {"weight": 1}}},
+    "material": {"name": "gold"},
+    "lighting": {"mode": "path"},
+    "objects": {
+        "ball": {"type": "sphere", "position": [1.3, 0, 0], "radius": 0.3, "material": "glass"},
+        "hole": {"type": "box", "join": "cut", "size": [0.5, 0.5, 0.5]},
+    },
+    "cut_planes": [{"objects": ["ball"]}],
+}
+FILM: dict[str, Any] = {
+    "animation": {
+        "frames": 5,
+        "tracks": {
+            "lights.0.position": {
+                "keys": [{"frame": 0, "value": [0.5, -2, 1]}, {"frame": 4, "value": [0, -2, 0]}]
+            },
+            "camera.fov": {"expression": "40 + frame"},
+        },
+    }
+}
+STEPS: dict[str, st.SearchStrategy[Any]] = {
+    "camera.position": vector(-1.5, 1.5),
+    "camera.fov": st.floats(1, 100),
+    "camera.frame": st.sampled_from(["all", None]),
+    "formula.iterations": st.integers(1, 8),
+    "formula.name": st.sampled_from(["mandelbulb", "mandelbox", "no such formula"]),
+    "lights.0.position": vector(-1.5, 1.5),
+    "lights.0.type": st.sampled_from(["point", "sphere", "set"]),
+    "lights.1.intensity": st.floats(-1, 5),
+    "lighting.mode": st.sampled_from(["path", "direct"]),
+    "materials.gold.base.metalness": st.floats(-0.2, 1.2),
+    "materials.gold.specular.roughness": st.sampled_from([0.3, {"by": "trap", "curve": [[0, 0], [1, 1]]}]),
+    "materials.glass": st.sampled_from([{}, {"transmission": {"weight": 0.5}}, {"blend": ["gold", "glass"]}]),
+    "materials.glass.transmission.weight": st.floats(0, 1),
+    "material.name": st.sampled_from(["gold", "glass", "lead", None]),
+    "objects.ball.position": vector(-2, 2),
+    "objects.ball.material": st.sampled_from(["glass", "gold", "lead", None]),
+    "objects.ball.join": st.sampled_from(["union", "cut", "smooth_union"]),
+    "objects.ball.radius": st.floats(-0.1, 2).map(lambda value: round(value, 3)),
+    "objects.sea": st.sampled_from([{"type": "water", "position": [0, 0, -1]}, {"type": "lake"}]),
+    "cut_planes.0.objects.0": st.sampled_from(["ball", "hole", "sea"]),
+    "cut_planes.0.cut": st.booleans(),
+    "renderer.type": st.sampled_from(["surface", "volume"]),
+    "renderer.points": st.sampled_from([None, {"pattern": "grid", "count": 4}]),
+    "renderer.step": st.floats(0, 5),
+    "coloring.by": st.sampled_from(["solid", "residual", "iterations", "taste"]),
+    "coloring.palette": st.sampled_from(["amber", "no palette"]),
+    "environment": st.sampled_from([None, {"name": "studio"}, {"name": "nowhere"}]),
+    "layout": st.sampled_from([None, {"views": [{}, {"renderer": {"type": "cut_plane"}}]}, {"views": []}]),
+    "stereo": st.sampled_from([None, {"mode": "rows"}]),
+    "glow": st.sampled_from([None, {"width": 0.1}, {"width": -1}]),
+    "output.channels": st.sampled_from([["R", "G", "B"], ["Z"], ["albedo.R"], ["nothing"]]),
+}
+
+
+@pytest.mark.parametrize("more", [{}, FILM], ids=["still", "film"])
+def test_one_edit_after_the_other_is_as_the_whole(more: dict[str, Any]) -> None:
+    """What has passed in a scene before is not checked again: that must hide no mistake."""
+    first = load_scene({**RICH, **more})
+
+    @given(st.lists(st.sampled_from(sorted(STEPS)), min_size=3, max_size=8), st.data())
+    def walk(paths: list[str], data: st.DataObject) -> None:
+        scene = first
+        for path in paths:
+            scene = step(scene, path, data.draw(STEPS[path]))
+
+    walk()
+
+
+def step(scene: Scene, path: str, value: Any) -> Scene:
+    """The scene after an edit, which is what its text gives then; or the same one, if it is refused as the text is."""
+    plain = scene.resolved()
+    assert load_scene(plain) == scene
+    wanted = told(lambda: load_scene(put(plain, path.split("."), value)))
+    found = told(lambda: edited(scene, {path: value}))
+    if isinstance(found, Scene):
+        assert found == wanted, (path, value)
+        assert found.resolved() == wanted.resolved()
+        return found
+    if not found[1].startswith(("there is no such", "a track of the film moves")):
+        assert found == wanted, (path, value)
+    return scene
+
+
+def told(make: Callable[[], Scene]) -> Any:
+    """The scene, or the path and the message of its error."""
+    try:
+        return make()
+    except ClfractalError as error:
+        return error.where.path, error.message
+
+
+def put(value: Any, path: list[str], new: Any) -> Any:
+    """Plain data with another value at a path."""
+    if not path:
+        return new
+    part, *rest = path
+    if isinstance(value, list):
+        index = int(part)
+        return [
+            *value[:index],
+            put(value[index] if index < len(value) else None, rest, new),
+            *value[index + 1 :],
+        ]
+    value = value or {}
+    return {**value, part: put(value.get(part), rest, new)}
+
+
+def test_an_edit_checks_what_it_changes_alone() -> None:
+    scene = edited(load_scene(RICH), {"camera.fov": 41.0})
+    checks = [check for check in scene._derived if check.__module__ != "clfractal.scene.model"]
+    after = edited(scene, {"background": {"top": [1.0, 0.0, 0.0]}})
+    again = [check.__name__ for check in checks if after._derived[check] is not scene._derived[check]]
+    assert again == []
+    assert all(
+        getattr(after, name) is getattr(scene, name) for name in Scene.model_fields if name != "background"
+    )
+    after = edited(scene, {"materials.gold.specular.roughness": 0.4})
+    assert after.materials["glass"] is scene.materials["glass"]
+    assert after.materials["gold"].base is scene.materials["gold"].base
+    after = edited(scene, {"lights.0.intensity": 2.0})
+    again = [check.__name__ for check in checks if after._derived[check] is not scene._derived[check]]
+    assert "_check_lights" in again
+    assert "_check_steps" not in again
+
+
 def test_what_an_edit_gives_can_be_rendered_and_written() -> None:
     scene = edited(shipped("mandelbulb"), {"formula.parameters.power": 5, "camera.fov": 33.0})
     assert scene.chain is not None
