@@ -217,7 +217,7 @@ async def simulate(count: int, seconds: float, address: str) -> None:
     from clfractal.cluster import tasks as real
     from clfractal.cluster.fingerprint import fingerprint
     from clfractal.device.select import choose
-    from clfractal.work.run import Tally
+    from clfractal.work.run import Counters
 
     info = choose(None).info
 
@@ -228,9 +228,16 @@ async def simulate(count: int, seconds: float, address: str) -> None:
         with real._one_at_a_time:
             channels = len(real._unpacked(data, arrays).channels)
         film = np.zeros((len(item.tiles), channels, TILE, TILE), np.float32)
-        own, tally, took = get_worker(), Tally(rays=1), seconds * len(item.tiles)
+        own, counters, took = get_worker(), Counters(rays=1), seconds * len(item.tiles)
         return real.Answer(
-            item.view, item.tiles, film, tally, took, own.address, str(own.name), real.render_device_of(info)
+            item.view,
+            item.tiles,
+            film,
+            counters,
+            took,
+            own.address,
+            str(own.name),
+            real.render_device_of(info),
         )
 
     for function in (enlist, tiles):

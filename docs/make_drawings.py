@@ -423,9 +423,7 @@ def _queues(sheet: Drawing, corner: Point, width: float, height: float) -> None:
             sheet.arrow((at - 22, y + height / 2), (at - 2, y + height / 2), PALE)
     last, under = x + 5 * (width + 22) + width / 2, y + height + 26
     sheet.box((x + width / 2, under), (last - x - width / 2, 30), RIGHT, 0.15)
-    told = (
-        "state of each shot, from stage to stage: sighting, spot, path, tally, and what else the scene needs"
-    )
+    told = "state of each shot, from stage to stage: sighting, spot, path, counters, and what else the scene needs"
     sheet.text(((x + width / 2 + last) / 2, under + 15), told, size=14)
     for middle in (x + width / 2 + 12, last - 12):
         sheet.arrow((middle, y + height), (middle, under), PALE, both=True)

@@ -31,16 +31,16 @@ STAGE(gather_air) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const spot found = spot_kept(s, 0);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const aim a = aim_kept(s);
     const ray r = eye_ray(&a, w.view);
     const real far = way_in_fog(s, r, &found, w);
     color air = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
         const encounter met = queue_met(s.q, next_turns + i, s.slot);
-        tally_met(&cost, met, 0);
+        counters_met(&cost, met, 0);
         air = color_pick(mask_of(met.hit), air, color_add(air, scattered(s, &here.at, r, far, i, w).light));
     }
     STATE_KEEP(s, air, STATE_AIR);
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
 }

@@ -18,7 +18,7 @@ STAGE(begin_shots) {
     const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
     aim_keep(s, &a);
     if (sample == first) count_waits_from(s.span, &here);
-    tally cost = {R(0.0), R(0.0), R(0.0)};
+    counters cost = {R(0.0), R(0.0), R(0.0)};
     start_of_rays begin = {R(0.0)};
     if (turns > 0 && sample == first) {
         begin.t = cone_end(s, &here, s.tile - first_tile, &cost);
@@ -26,7 +26,7 @@ STAGE(begin_shots) {
     } else if (turns > 0) {
         STATE_RECALL(s, begin, STATE_START);
     }
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
     ray r = eye_ray(&a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);

@@ -64,7 +64,7 @@ INLINE void cones_send(pass s, queue q, int first, int first_tile, world w) {
 
 // Where the rays of a packet's block begin, and what finding it has cost. A block in parts has its cone with each of them; it
 // counts once, for the first sample of the block's first pixel.
-INLINE real cone_end(stage s, const place_in_pass *here, int tile, tally *cost) {
+INLINE real cone_end(stage s, const place_in_pass *here, int tile, counters *cost) {
     const __global scalar *met = s.q.met + block_in_wave(s.span, tile, here->packet);
     if (s.sample == 0 && here->packet % PACKETS_OF_BLOCK == 0) {
         scalar steps[LANES] = {met[ENCOUNTER_STEPS * s.q.stride]}, count[LANES] = {met[ENCOUNTER_COUNT * s.q.stride]};

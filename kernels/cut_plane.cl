@@ -18,7 +18,7 @@ typedef struct {
     __global const float *palette;
 } world;
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
+INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     const real from_center_x = at->x - (real)(w.view->center_x), from_center_y = at->y - (real)(w.view->center_y);
     real time = R(0.0);
     if (w.view->spans > 0) time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);

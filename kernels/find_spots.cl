@@ -12,12 +12,12 @@ STAGE(find_spots) {
     const aim a = aim_kept(s);
     path so_far;
     const ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     real object;
     vec place;
     encounter seen = surface_met(s, 0, r, &object, &place, w);
     if (bounce > 0 && HAS(w, GLASS_SET)) seen = met_within(s, r, seen, &object, &place, w);
-    tally_met(&cost, seen, 1);
+    counters_met(&cost, seen, 1);
     const sighting at_first = {seen.hit, seen.steps};
     spot found = spot_of_ray(r, seen, object, place, w);
     if (bounce > 0 && HAS(w, SUBSURFACE)) {

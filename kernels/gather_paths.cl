@@ -14,11 +14,11 @@ STAGE(gather_paths) {
     PATH_STAGE_BEGINS(s, w);
     STATE_KEPT(s, path, so_far, STATE_PATH);
     carried with = carried_kept(s);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const encounter answer = queue_met(s.q, 0, s.slot);
-    tally_met(&cost, answer, 0);
+    counters_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
     STATE_KEEP(s, so_far, STATE_PATH);
     real far = (real)(REAL_LARGEST);
     const mask within = HAS(w, GLASS_SET) ? equal(body_of(with.medium), set_body(w)) : less(R(1.0), R(0.0));
@@ -35,10 +35,10 @@ STAGE(end_paths) {
     STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
     STATE_KEPT(s, path, so_far, STATE_PATH);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     carried with = carried_kept(s);
     const encounter last = queue_met(s.q, 0, s.slot);
-    tally_met(&cost, last, 0);
+    counters_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
     if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));

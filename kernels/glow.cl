@@ -15,7 +15,7 @@
 #define GLOW_PARTS 256       // most parts of a way
 
 // What a ray from `r.near` to `r.far` sees of the glow, for an intensity of 1.
-INLINE real glow_along(ray r, mask active, bits seed, tally *cost, world w, orbit_record orbit, constants k) {
+INLINE real glow_along(ray r, mask active, bits seed, counters *cost, world w, orbit_record orbit, constants k) {
     material_record m = w.material;
     const real width = (real)(m->glow_width), widest = (real)(w.settings->bounds_radius);
     const real least_part = (r.far - r.near) * R(0.00390625);
@@ -55,11 +55,11 @@ STAGE(add_glow) {
     real ignored;
     const mask clear = planes_cut(&r, &ignored, w.planes);
     const mask near = ray_clip(&r, settings->bounds_center, (real)(settings->bounds_radius) + GLOW_BEYOND * (real)(material->glow_width));
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const bits seed = hash_bits(pixel_seed(here.at.columns, here.at.rows, (uint)settings->seed, PURPOSE_GLOW + 16u * (uint)bounce)
                                 + (bits)((uint)sample * 0x85ebca6bu));
     const real strength = glow_along(r, wanted & clear & near, seed, &cost, w, orbit, k);
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
     const color glow = color_scale(color_splat(material->glow_color), strength);
     if (bounce == 0) {
         STATE_KEEP(s, glow, STATE_GLOW);

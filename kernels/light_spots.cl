@@ -15,7 +15,7 @@ STAGE(light_spots) {
     STAGE_BEGINS(s, w);
     const aim a = aim_kept(s);
     spot found = spot_kept(s, bounce);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const vec direction = arrived.direction;
@@ -34,7 +34,7 @@ STAGE(light_spots) {
     const color mirrored = color_pick(on_face(&found), color_of(R(0.0), R(0.0), R(0.0)), mirrored_at(&found, direction, w));
     path_add(s, &so_far, direction, a.y, &found, gathered, mirrored, last, w);
     if (!last) {
-        STATE_KEEP(s, cost, STATE_TALLY);
+        STATE_KEEP(s, cost, STATE_COUNTERS);
         path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, mirrored, w);
         return;
     }

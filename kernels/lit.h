@@ -13,13 +13,13 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
 }
 
 // The light of lights without a size.
-INLINE color light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
+INLINE color light_gathered(stage s, const spot *here, vec to_viewer, counters *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     const look l = look_of(here, w);
     for (int turn = 0; turn < w.settings->light_count; ++turn) {
         light_record light = w.lights + turn;
         const encounter met = queue_met(s.q, turn, s.slot);
-        tally_met(cost, met, 0);
+        counters_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
         const color more = lit_by(s, here, in, ~mask_of(met.hit), R(1.0), to_viewer, light, l, w);

@@ -1,5 +1,5 @@
 // A renderer whose kernel takes its shots from beginning to end. It defines before this file: `world`, what its shots read, and
-//   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost)
+//   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost)
 // which takes one shot at (across, below), in pixels from each pixel's middle.
 #include "passes.h"
 
@@ -10,7 +10,7 @@ CALLED void render_packet(int packet, int tile, pass s, world w) {
     pixel p = pixel_before(s, &here);
     const real shots_before = p.shots;
     real hits = R(0.0);
-    tally cost = {R(0.0), R(0.0), R(0.0)};
+    counters cost = {R(0.0), R(0.0), R(0.0)};
     for (int sample = s.first; sample < s.end; ++sample) {
         if (!any_lane(here.at.in_region & ~less(p.shots, (real)((scalar)sample)))) break;
         const mask active = sample_wanted(s, &here.at, &p, sample);

@@ -108,7 +108,7 @@ INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
 INLINE void count_waits_from(pass s, const place_in_pass *here) { if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u; }
 
 // Counts what the launch has done for the packet, or adds to what was counted.
-INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, tally cost) {
+INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, counters cost) {
     const real counts[STATISTIC_WAITS] = {shots, hits, cost.steps, cost.count, cost.bad};
 #define ADD_COUNT(i) here->sums[i] = (add ? here->sums[i] : 0u) + (uint)lanes_sum(counts[i]);
     FOR_NUMBERS(STATISTIC_WAITS, ADD_COUNT)

@@ -12,11 +12,11 @@ STAGE(send_points) {
     queue of_set = s.q;
     of_set.objects = 0;
     const encounter end_of_cone = queue_met(of_set, 0, s.slot);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
-    tally_met(&cost, end_of_cone, 0);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
+    counters_met(&cost, end_of_cone, 0);
     cost.bad += end_of_cone.bad;
     const touch touched = {end_of_cone.hit, end_of_cone.t};
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
     STATE_KEEP(s, touched, STATE_TOUCH);
     points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
 }
@@ -26,7 +26,7 @@ STAGE(join_points) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const aim a = aim_kept(s);
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     STATE_KEPT(s, touch, touched, STATE_TOUCH);
     sighting at_first = {R(0.0), cost.steps};
     const ray r = eye_ray(&a, view);
@@ -36,7 +36,7 @@ STAGE(join_points) {
         real object;
         vec place;
         const encounter met = surface_met(s, turn, each, &object, &place, w);
-        tally_met(&cost, met, 1);
+        counters_met(&cost, met, 1);
         at_first.steps += met.steps;
         points_add(s, &points, turn, each, met, object, place, w);
     }

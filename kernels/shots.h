@@ -120,7 +120,7 @@ INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, sh
 }
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
-INLINE void end_shots(stage s, aim a, color seen, const spot *here, tally cost, world w) {
+INLINE void end_shots(stage s, aim a, color seen, const spot *here, counters cost, world w) {
     const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
     const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);

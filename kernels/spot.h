@@ -140,7 +140,7 @@ INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *pl
 INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
 
 // What a march has cost, and where `of_surface` what finding its normal has.
-INLINE void tally_met(tally *cost, encounter met, int of_surface) {
+INLINE void counters_met(counters *cost, encounter met, int of_surface) {
     cost->steps += met.steps;
     cost->count += met.count;
     if (!of_surface) return;

@@ -81,7 +81,7 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, cons
 
 #include "volume_shot.h"
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
+INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
     sight e;

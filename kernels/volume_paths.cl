@@ -11,7 +11,7 @@ INLINE void lights_beside_asked(choosing *c, const real *numbers, world w) {}
 #include "light_asks.h"
 #include "volume_paths.h"
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, tally *cost) {
+INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
     return take_path(at, r, at->y + below, time, sample, active, w, &cost->steps);

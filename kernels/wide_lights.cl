@@ -15,14 +15,14 @@ STAGE(gather_light) {
     STAGE_BEGINS(s, w);
     spot found = spot_kept(s, bounce);
     if (!any_lane(mask_of(found.found))) return;
-    STATE_KEPT(s, tally, cost, STATE_TALLY);
+    STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const aim a = aim_kept(s);
     path so_far;
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
     const color gathered = wide_light_gathered(s, &found, vec_scale(direction, R(-1.0)), &cost, w);
     STATE_KEEP(s, gathered, STATE_GATHERED);
-    STATE_KEEP(s, cost, STATE_TALLY);
+    STATE_KEEP(s, cost, STATE_COUNTERS);
 }
 
 // Finds the lights that are before what rays along the path have met.

@@ -112,10 +112,10 @@ INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const spot *he
 
 // The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
 INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
-                          tally *cost, world w) {
+                          counters *cost, world w) {
     const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
     const encounter met = queue_met(s.q, turn, s.slot);
-    tally_met(cost, met, 0);
+    counters_met(cost, met, 0);
     color shines;
     mask shadow;
     const int number = s.sample * w.settings->set_rays + of_set;
@@ -126,7 +126,7 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
 }
 
 // The light that the spot's rays have brought.
-INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, tally *cost, world w) {
+INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, counters *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     const look l = look_of(here, w);
     real open = R(1.0);
@@ -134,7 +134,7 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, tally
     if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
     for (; turn < hemisphere_turns(w); ++turn) {
         const encounter met = queue_met(s.q, turn, s.slot);
-        tally_met(cost, met, 0);
+        counters_met(cost, met, 0);
         gathered = color_add(gathered, ambient_light(s, here, turn, met, surround_of(l), w, &open));
     }
     gathered = limited(gathered, w.settings);
@@ -148,7 +148,7 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, tally
         light_record light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
         const encounter met = queue_met(s.q, turn, s.slot);
-        tally_met(cost, met, 0);
+        counters_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
         if (light_is_seen(light)) in = light_along(light, here->point, in.toward);

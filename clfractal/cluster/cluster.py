@@ -50,7 +50,7 @@ class Share:
         device: what it renders with.
         bundles, tiles: how many it has rendered.
         seconds: wall time of its tasks.
-        kernel_ms, build_ms: see `Tally`.
+        kernel_ms, build_ms: see `Counters`.
     """
 
     name: str
@@ -184,8 +184,10 @@ class Cluster:
                     left -= len(tiles)
                     self._count(answer)
                     # Programs are built side by side.
-                    tally = replace(answer.tally, build_ms=answer.tally.build_ms / max(len(self._shares), 1))
-                    yield Result(answer.view, tiles, film, tally, answer.render_device)
+                    counters = replace(
+                        answer.counters, build_ms=answer.counters.build_ms / max(len(self._shares), 1)
+                    )
+                    yield Result(answer.view, tiles, film, counters, answer.render_device)
                 finally:
                     self._call(self._dispatcher.stored)
         finally:
@@ -234,8 +236,8 @@ class Cluster:
         share.bundles += 1
         share.tiles += len(answer.tiles)
         share.seconds += answer.seconds
-        share.kernel_ms += answer.tally.kernel_ms
-        share.build_ms += answer.tally.build_ms
+        share.kernel_ms += answer.counters.kernel_ms
+        share.build_ms += answer.counters.build_ms
 
     # Questions to a worker
 

@@ -374,7 +374,7 @@ class Dispatcher:
         except Exception as error:  # a mistake of this program's
             work.answers.put(_failed(self._place, error))
         else:
-            seconds = max(answer.seconds - 1e-3 * answer.tally.build_ms, 1e-6)
+            seconds = max(answer.seconds - 1e-3 * answer.counters.build_ms, 1e-6)
             self.pace.learn(len(item.tiles), item.samples[1] - item.samples[0], seconds)
             work.answers.put(answer)
             permit.pass_on()  # to whoever takes the answer out of the queue

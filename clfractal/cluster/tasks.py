@@ -28,7 +28,7 @@ from clfractal.errors import ClfractalError, Stopped, Where
 from clfractal.pictures.provenance import RenderDevice
 from clfractal.work.job import Job
 from clfractal.work.prepare import pays_to_measure, with_lanes
-from clfractal.work.run import Floats, Tally, Tiles, WorkItem
+from clfractal.work.run import Counters, Floats, Tiles, WorkItem
 
 if TYPE_CHECKING:
     from clfractal.work.engine import Engine
@@ -93,7 +93,7 @@ class Answer:
         view: number of the view.
         tiles: their indices.
         film: float32 of shape (tiles, channels, TILE, TILE).
-        tally: what they took.
+        counters: what they took.
         seconds: wall time of the worker, with what it had to build.
         worker: its address.
         name: what Dask calls it.
@@ -103,7 +103,7 @@ class Answer:
     view: int
     tiles: Tiles
     film: Floats
-    tally: Tally
+    counters: Counters
     seconds: float
     worker: str
     name: str
@@ -156,9 +156,9 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
     def work(engine: Engine, token: CancelToken) -> Answer:
         start = time.perf_counter()
         job = _fitted(_unpacked(data, arrays), engine.device)
-        tally, found, films = Tally(), [], []
+        counters, found, films = Counters(), [], []
         for result in engine.executor.execute(job, [item], token):
-            tally.add(result.tally)
+            counters.add(result.counters)
             if len(result.tiles):
                 found.append(np.asarray(result.tiles, np.int32))
                 films.append(result.film)
@@ -166,7 +166,7 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
             item.view,
             np.concatenate(found),
             films[0] if len(films) == 1 else np.concatenate(films),
-            tally,
+            counters,
             time.perf_counter() - start,
             get_worker().address,
             str(get_worker().name),

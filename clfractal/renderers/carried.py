@@ -78,8 +78,8 @@ TOUCH = _carried(
     ("real", "touched", "whether the set is there"),
     ("real", "t", "distance along its ray, scene units"),
 )
-TALLY = _carried(
-    "tally",
+COUNTERS = _carried(
+    "counters",
     "What rays cost.",
     ("real", "steps", "distance evaluations; of a volume: places looked at"),
     ("real", "count", "applications of the formula"),
@@ -261,7 +261,7 @@ MATTES = Carried(
     ),
 )
 TYPES = (
-    TALLY,
+    COUNTERS,
     PIXEL,
     PARTS_OF_LIGHT,
     MATTES,

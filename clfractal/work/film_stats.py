@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.work.job import Job
-from clfractal.work.run import Progress, Tally
+from clfractal.work.run import Counters, Progress
 from clfractal.work.stats import statistics
 
 
@@ -39,9 +39,9 @@ class FilmStats:
         self._sum.add(state)
         self._sum.tiles += state.tiles
         self._sum.tiles_before += state.tiles_before
-        for render_device, (tiles, tally) in state.render_devices.items():
-            before, total = self._sum.render_devices.get(render_device, (0, Tally()))
-            total.add(tally)
+        for render_device, (tiles, counters) in state.render_devices.items():
+            before, total = self._sum.render_devices.get(render_device, (0, Counters()))
+            total.add(counters)
             self._sum.render_devices[render_device] = (before + tiles, total)
         self._write_ms += write_ms
         times = {

@@ -20,7 +20,7 @@ from clfractal.renderers.plan import PlannedView
 from clfractal.renderers.resources import Kept, Resources
 from clfractal.work.drawing import SLOTS, Drawing, Outlet, OutputBuffers
 from clfractal.work.job import Job
-from clfractal.work.run import Result, Tally, WorkItem
+from clfractal.work.run import Counters, Result, WorkItem
 from clfractal.work.stages import Span
 
 Tiles = npt.NDArray[np.int32]
@@ -231,27 +231,27 @@ def _launched(
     pace.seconds = budget_seconds / IN_FLIGHT
     pace.most = float(drawing.capacity * cutter.per_tile)
     pace.begin()
-    tally = Tally(build_ms=drawing.build_ms)
+    counters = Counters(build_ms=drawing.build_ms)
     launches = in_launches(
         drawing.device, cutter.enqueue, pace, doing="rendering", token=token, watched=drawing.watched
     )
     with closing(launches):
         for span, milliseconds in launches:
-            tally.kernel_ms += milliseconds
+            counters.kernel_ms += milliseconds
             if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                 # Only a part of a tile is done: there is nothing to read yet.
-                yield Result(item.view, _NO_TILES, _NO_FILM, tally)
+                yield Result(item.view, _NO_TILES, _NO_FILM, counters)
             elif outlet is not None and last:
                 # Only now: a launch that was cancelled has left unfinished tiles.
                 drawing.hand_over(span, outlet)
-                yield Result(item.view, span.tiles, _NO_FILM, tally)
+                yield Result(item.view, span.tiles, _NO_FILM, counters)
             else:
                 film, sums = drawing.collect(span)
                 for name, count in zip(STATISTICS, sums, strict=True):
-                    setattr(tally, name, int(count))
+                    setattr(counters, name, int(count))
                 done = (span.tiles, film) if last else (_NO_TILES, _NO_FILM)
-                yield Result(item.view, *done, tally)
-            tally = Tally()
+                yield Result(item.view, *done, counters)
+            counters = Counters()
 
 
 class _Cutter:

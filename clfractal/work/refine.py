@@ -17,7 +17,7 @@ from clfractal.pictures.film import Film
 from clfractal.work.films import JobFilms, Took
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
-from clfractal.work.run import Progress, Tally, run
+from clfractal.work.run import Counters, Progress, run
 
 if TYPE_CHECKING:
     from clfractal.work.several import SeveralExecutor
@@ -67,8 +67,8 @@ def refined(
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
     """
-    start, total, seconds = time.perf_counter(), Tally(), 0.0
-    of_views = [Tally() for _ in job.views]
+    start, total, seconds = time.perf_counter(), Counters(), 0.0
+    of_views = [Counters() for _ in job.views]
 
     def passed(films: JobFilms, samples: tuple[int, int] | None = None) -> Progress:
         """Makes one pass, and gives the counts and times of all passes so far."""

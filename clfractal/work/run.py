@@ -42,7 +42,7 @@ class WorkItem:
 
 
 @dataclass(slots=True, kw_only=True)
-class Tally:
+class Counters:
     """Counts and times: camera rays (all samples), those of them that found anything, distance evaluations and
     applications of all rays, and lanes that waited for others, in distance evaluations; times in ms."""
 
@@ -55,7 +55,7 @@ class Tally:
     kernel_ms: float = 0.0
     build_ms: float = 0.0
 
-    def add(self, other: Tally) -> None:
+    def add(self, other: Counters) -> None:
         """Adds what other work took."""
         self.rays += other.rays
         self.hits += other.hits
@@ -75,7 +75,7 @@ class Result:
         view: number of the view in the job.
         tiles: indices of the tiles.
         film: their channels, shape (tiles, channels, TILE, TILE).
-        tally: see `Tally`.
+        counters: see `Counters`.
         render_device: the device that made them, where several do a job.
         remark: what the user should know about the work, or empty.
     """
@@ -83,7 +83,7 @@ class Result:
     view: int
     tiles: Tiles
     film: Floats
-    tally: Tally
+    counters: Counters
     render_device: RenderDevice | None = None
     remark: str = ""
 
@@ -105,7 +105,7 @@ class Executor(Protocol):
 
 
 @dataclass(slots=True)
-class Progress(Tally):
+class Progress(Counters):
     """The progress of a job, its counts and times; `remaining` is None until it can be estimated.
 
     `views` has the counts and times of each of the job's views, `render_devices` those of each device where several do the
@@ -116,8 +116,8 @@ class Progress(Tally):
     tiles_done: int = 0
     started: float = field(default_factory=time.perf_counter)
     tiles_before: int = 0
-    views: list[Tally] = field(default_factory=list)
-    render_devices: dict[RenderDevice, tuple[int, Tally]] = field(default_factory=dict)
+    views: list[Counters] = field(default_factory=list)
+    render_devices: dict[RenderDevice, tuple[int, Counters]] = field(default_factory=dict)
     remarks: list[str] = field(default_factory=list)
 
     @property
@@ -178,7 +178,7 @@ def run(
     """
     before = sum(int(np.count_nonzero(store.done)) for store in stores) if samples is None else 0
     state = Progress(sum(store.grid.count for store in stores), before, tiles_before=before)
-    state.views = [Tally() for _ in stores]
+    state.views = [Counters() for _ in stores]
     items = []
     for number, (view, store) in enumerate(zip(job.views, stores, strict=True)):
         order = store.grid.order_from_center()
@@ -192,9 +192,9 @@ def run(
         for result in results:
             store, render_device = stores[result.view], result.render_device
             if render_device is not None:
-                tiles, tally = state.render_devices.setdefault(render_device, (0, Tally()))
-                tally.add(result.tally)
-                state.render_devices[render_device] = (tiles + len(result.tiles), tally)
+                tiles, counters = state.render_devices.setdefault(render_device, (0, Counters()))
+                counters.add(result.counters)
+                state.render_devices[render_device] = (tiles + len(result.tiles), counters)
             elif store.provenance.known:  # an earlier run had several devices
                 render_device = RenderDevice.of(job.device.index, job.device.name, job.device.key)
             if len(result.tiles):
@@ -202,8 +202,8 @@ def run(
             if result.remark:
                 state.remarks.append(result.remark)
             state.tiles_done += len(result.tiles)
-            state.add(result.tally)
-            state.views[result.view].add(result.tally)
+            state.add(result.counters)
+            state.views[result.view].add(result.counters)
             seconds[result.view] += state.seconds - last
             store.tell("seconds", seconds[result.view])
             last = state.seconds

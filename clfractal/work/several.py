@@ -21,7 +21,7 @@ from clfractal.work.device_workers import DeviceWorkers
 from clfractal.work.job import Job, Kind
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import lanes_of, pays_to_measure
-from clfractal.work.run import Result, Tally, WorkItem
+from clfractal.work.run import Counters, Result, WorkItem
 from clfractal.work.sharing import Offer, Shared
 
 # For so long a finished picture waits for programs that are being compiled for the next one, seconds.
@@ -205,11 +205,13 @@ class SeveralExecutor:
             if told.result is not None:
                 # Devices build side by side.
                 before = max(built)
-                built[told.place] += told.result.tally.build_ms
-                tally = replace(told.result.tally, build_ms=max(built) - before)
+                built[told.place] += told.result.counters.build_ms
+                counters = replace(told.result.counters, build_ms=max(built) - before)
                 self._own(told.result, numbers[told.place])
                 missing -= len(told.result.tiles)
-                yield replace(told.result, tally=tally, render_device=render_device_of(executor.device.info))
+                yield replace(
+                    told.result, counters=counters, render_device=render_device_of(executor.device.info)
+                )
                 continue
             if told.place not in workers.running:  # it hung, and its end is no news
                 continue
@@ -301,7 +303,7 @@ def _silent(device: Device, seconds: float) -> DeviceError:
 
 
 def _remark(line: str) -> Result:
-    return Result(0, _NO_TILES, _NO_FILM, Tally(), remark=line)
+    return Result(0, _NO_TILES, _NO_FILM, Counters(), remark=line)
 
 
 def _is_of_text(error: DeviceError | KernelBuildError) -> bool:

@@ -74,10 +74,10 @@ def statistics(
                 "index": render_device.index,
                 "device": render_device.name,
                 "tiles": tiles,
-                "rays": tally.rays,
-                "kernel_ms": round(tally.kernel_ms, 3),
+                "rays": counters.rays,
+                "kernel_ms": round(counters.kernel_ms, 3),
             }
-            for render_device, (tiles, tally) in sorted(
+            for render_device, (tiles, counters) in sorted(
                 state.render_devices.items(), key=lambda each: each[0].index
             )
         ]

@@ -27,7 +27,7 @@ from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError
 from clfractal.pictures.tiles import TILE
 from clfractal.work.engine import Engine
 from clfractal.work.job import Job
-from clfractal.work.run import Tally, WorkItem
+from clfractal.work.run import Counters, WorkItem
 from tests.shell import SCENE
 
 
@@ -69,7 +69,7 @@ class Played:
 def an_answer(job: Job, item: WorkItem, worker: str = "tcp://host:0") -> tasks.Answer:
     film = np.zeros((len(item.tiles), len(job.channels), TILE, TILE), np.float32)
     return tasks.Answer(
-        item.view, item.tiles, film, Tally(), 1.0, worker, "w0", tasks.render_device_of(job.device)
+        item.view, item.tiles, film, Counters(), 1.0, worker, "w0", tasks.render_device_of(job.device)
     )
 
 
