@@ -1,0 +1,54 @@
+"""A torus as an object."""
+
+from math import hypot
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.schema.base import Length, Vector, problem
+from clfractal.schema.fields import SCALE
+from clfractal.schema.shape import Solid
+
+
+class TorusObject(Solid):
+    """A torus, as a ring or a tyre; it lies around the z axis before it is rotated."""
+
+    tag = "torus"
+    title = "Torus"
+    place = 60
+    spans = 2
+    type: Literal["torus"] = "torus"
+    radius: Annotated[Length, SCALE] = Field(
+        0.5, description="of its ring, to the middle of the tube, scene units"
+    )
+    tube: Annotated[Length, SCALE] = Field(
+        0.15, description="radius of its tube, at most `radius`, scene units"
+    )
+
+    @model_validator(mode="after")
+    def _has_a_ring(self) -> Self:
+        if self.tube > self.radius:
+            raise problem(f"must be at most the ring's radius, {self.radius:g}, got {self.tube:g}", "tube")
+        return self
+
+    @classmethod
+    def first(cls, radius: float) -> dict[str, Any]:
+        """As of every solid."""
+        return {"radius": 0.76 * radius, "tube": 0.23 * radius}
+
+    @property
+    def half_sides(self) -> Vector:
+        """As of every solid."""
+        return (self.radius + self.tube, self.radius + self.tube, self.tube)
+
+    @property
+    def form(self) -> Vector:
+        """The radii of ring and tube, over the distance from its middle to its rim."""
+        rim = self.radius + self.tube
+        return (self.radius / rim, self.tube / rim, 0.0)
+
+    def holds(self, point: Vector) -> bool:
+        """Whether a point is inside."""
+        x, y, z = self.own_place(point)
+        ring, tube, _ = self.form
+        return (hypot(x, y) - ring) ** 2 + (tube * z) ** 2 < tube**2
