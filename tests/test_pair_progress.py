@@ -11,7 +11,7 @@ import pytest
 
 import clfractal
 from clfractal.pictures.compose import Side
-from clfractal.work import save
+from clfractal.work import finish
 from clfractal.work.films import JobFilms
 from clfractal.work.run import Progress, run
 from tests.interrupts import planes, watched
@@ -88,7 +88,7 @@ def test_nothing_is_left(here: Path, shell: InProcess, monkeypatch: pytest.Monke
         raise OSError(28, "No space left on device")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(save, "save_outputs", full)
+        patch.setattr(finish, "save_outputs", full)
         assert render(shell, "--quiet").status == 2
     seen = watched(monkeypatch)
     ended = render(shell, "--resume", "--stats", "stats.json")

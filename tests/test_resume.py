@@ -97,9 +97,9 @@ def interrupted(folder: Path) -> None:
     """Leaves the work of the small scene behind: the disk was full when the picture was written."""
     (folder / "scene.yaml").write_text(SCENE)
     code = (
-        "import sys; from clfractal.cli import main; from clfractal.work import save\n"
+        "import sys; from clfractal.cli import main; from clfractal.work import finish\n"
         "def full(*_): raise OSError(28, 'No space left on device')\n"
-        "save.save_outputs = lambda *a, **k: full()\n"
+        "finish.save_outputs = lambda *a, **k: full()\n"
         "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'a.png', '--quiet']; main()"
     )
     python = command()[0]

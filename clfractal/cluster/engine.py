@@ -84,9 +84,9 @@ class ClusterEngine(AnyEngine):
         found: Scene = self.cluster.unpacked(self.cluster.answered(asked), message)
         return found
 
-    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
+    def _prepared(self, scene: Scene, asked: Mapping[str, Any]) -> Job:
         """Decided for the device that most workers have."""
-        return self._decided(self._asking(scene, **asked, quality=quality))
+        return self._decided(self._asking(scene, **asked))
 
     def in_order(
         self, scenes: Iterable[Scene], wanted: Callable[[Job], bool], **settings: Any

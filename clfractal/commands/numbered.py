@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 from clfractal.commands.progress import Reporter
 from clfractal.commands.unfinished import Unfinished, continued
 from clfractal.work.films import JobFilms
+from clfractal.work.finish import save_job
 from clfractal.work.run import run
-from clfractal.work.save import save_job
 
 if TYPE_CHECKING:
     from clfractal.commands.shell import Shell

@@ -81,9 +81,9 @@ def _render(
     from clfractal.commands.unfinished import Unfinished, continued
     from clfractal.pictures.outputs import output_files
     from clfractal.work import stats
+    from clfractal.work.finish import save_job
     from clfractal.work.remarks import remarks_of
     from clfractal.work.run import run
-    from clfractal.work.save import save_job
 
     outputs = order.outputs
     with speaking_of(order.scene), naming_options():

@@ -18,12 +18,12 @@ from clfractal.scene.model import Scene
 from clfractal.viewer.fitting import Cancellable, measured_exposure, with_exposure
 from clfractal.viewer.preparing import internal_error
 from clfractal.work.films import JobFilms
+from clfractal.work.finish import save_job
 from clfractal.work.job import Job
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.preview import Preview
 from clfractal.work.run import Progress, run
-from clfractal.work.save import save_job
 from clfractal.work.settle import settled
 
 Pixels = npt.NDArray[np.uint8]

@@ -14,8 +14,8 @@ from clfractal.pictures.tiled import Floats
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.canvas import Canvas
-from clfractal.work.denoising import darkness_is_certain
 from clfractal.work.films import JobFilms
+from clfractal.work.finish import darkness_is_certain
 from clfractal.work.local import LocalExecutor
 from clfractal.work.prepare import prepare
 from clfractal.work.run import run

@@ -98,17 +98,22 @@ class AnyEngine(ABC):
         """
         asked: dict[str, Any] = {"precision": precision, "samples": samples, "region": region}
         asked |= {"channels": channels, "pictures": pictures}
+        loaded = as_scene(scene)
         if size is not None:
-            from clfractal.work.sized import with_size
+            from clfractal.work.prepare import with_size
 
-            scene = with_size(as_scene(scene), size)
-        job = self._prepared(scene, asked, quality)
+            loaded = with_size(loaded, size)
+        if quality is not None:
+            from clfractal.work.quality import with_quality
+
+            loaded = with_quality(loaded, quality)
+        job = self._prepared(loaded, asked)
         if job.denoises:
             check_installed()
         return job
 
     @abstractmethod
-    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
+    def _prepared(self, scene: Scene, asked: Mapping[str, Any]) -> Job:
         """See `prepare`; `asked` are arguments of `prepare.prepare`."""
 
     def in_order(

@@ -126,28 +126,20 @@ class Engine(AnyEngine):
             loaded = as_scene(scene)
             return self._by_any_device(lambda: settled(loaded, self.preview))
 
-    def _prepared(self, scene: SceneLike, asked: Mapping[str, Any], quality: str | None) -> Job:
-        loaded = as_scene(scene)
-        if quality is not None:
-            from clfractal.work.quality import with_quality
+    def _prepared(self, scene: Scene, asked: Mapping[str, Any]) -> Job:
+        """For the engine's device, and for the others of several."""
 
-            loaded = with_quality(loaded, quality)
-        return self._by_any_device(lambda: self._decided(loaded, asked))
+        def decided() -> Job:
+            device = self.device
+            built_before = device.loaded.building.milliseconds
+            # Made first, so that mistakes are reported before anything is rendered.
+            job = prepare(scene, device, on_start=self.tell, **asked)
+            if not is_settled(scene):
+                job = prepare(settled(scene, self.preview), device, on_start=self.tell, **asked)
+            self.previews_built_ms = device.loaded.building.milliseconds - built_before
+            return job if isinstance(self.executor, LocalExecutor) else self.executor.shared(job, device)
 
-    def _decided(self, scene: Scene, asked: Mapping[str, Any]) -> Job:
-        """The job of a scene for the engine's device, and for the others of several."""
-        device = self.device
-        built_before = device.loaded.building.milliseconds
-
-        def decide(wanted: Scene) -> Job:
-            return prepare(wanted, device, on_start=self.tell, **asked)
-
-        # Made first, so that mistakes are reported before anything is rendered.
-        job = decide(scene)
-        if not is_settled(scene):
-            job = decide(settled(scene, self.preview))
-        self.previews_built_ms = device.loaded.building.milliseconds - built_before
-        return job if isinstance(self.executor, LocalExecutor) else self.executor.shared(job, device)
+        return self._by_any_device(decided)
 
     def _by_any_device(self, work: Callable[[], T]) -> T:
         """What `work` gives on the engine's device; of several the next one tries if it fails.

@@ -11,7 +11,7 @@ from clfractal.pictures.develop import Development
 from clfractal.pictures.film import Film, in_memory
 from clfractal.pictures.tiled import Picture
 from clfractal.work.comfort import comfort_of_films
-from clfractal.work.denoising import finished
+from clfractal.work.finish import finished
 from clfractal.work.job import Job
 from clfractal.work.probing import FilmProber
 from clfractal.work.remarks import remarks_of

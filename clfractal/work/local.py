@@ -79,8 +79,13 @@ class LocalExecutor:
         for item in items:
             if len(item.tiles):
                 view = job.views[item.view]
-                done = self._by_samples if view.changing else self._at_once
-                yield from done(view, item, self.supply or _in_order(item.tiles), token)
+                take = self.supply or _in_order(item.tiles)
+                if view.changing:
+                    yield from self._by_samples(view, item, take, token)
+                else:
+                    in_passes = item.samples != (0, view.plan.samples)
+                    places = _Places.of_all(view) if in_passes else None
+                    yield from self._drawn(view, item, take, token, places)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
 
@@ -123,13 +128,6 @@ class LocalExecutor:
         self._drawings.clear()
         self._outputs = OutputBuffers(self.device)
         self.kept = Kept()
-
-    def _at_once(
-        self, view: PlannedView, item: WorkItem, take: Supply, token: CancelToken | None
-    ) -> Generator[Result]:
-        """Renders tiles of a view that is the same for all samples."""
-        in_passes = item.samples != (0, view.plan.samples)
-        yield from self._drawn(view, item, take, token, _Places.of_all(view) if in_passes else None)
 
     def _by_samples(
         self, view: PlannedView, item: WorkItem, take: Supply, token: CancelToken | None

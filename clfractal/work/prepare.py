@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from typing import cast
+from typing import Any, cast
 
 from clfractal import arguments
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
-from clfractal.errors import Where
+from clfractal.errors import SceneError, Where
 from clfractal.files.channels import ALBEDO, NOISY, NORMAL, check_channels
 from clfractal.optics.view import seen_by, shown_views
 from clfractal.pictures.compose import Side, composed_channels, eye_regions
@@ -19,9 +19,10 @@ from clfractal.renderers.lanes import best_lanes, rule_of
 from clfractal.renderers.plan import Plan, PlannedView, PrecisionChoice, choose_precision, make_region
 from clfractal.renderers.records import bounces
 from clfractal.renderers.shutter import shutter_of
-from clfractal.scene.checks import check_layers
+from clfractal.scene.checks import check_layers, check_parts
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
+from clfractal.scene.parts import MAX_PIXELS, MAX_SIDE
 from clfractal.scene.stereo import MIDDLE, Eye
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.work.job import Composition, Identity, Job, Paste, StereoPair
@@ -115,6 +116,29 @@ def prepare(
         measures = pays_to_measure(views, device, pictures)
     found = tuple(with_lanes(views, device, measures=measures, on_start=on_start))
     return Job(scene, found, composition, names, device.info, chooser.remark)
+
+
+def with_size(scene: Scene, size: Any) -> Scene:
+    """The scene at another size; it shows what its own size shows (see `Image.resized`).
+
+    Args:
+        size: width and height of the picture, pixels.
+
+    Raises:
+        SceneError: the size is none, too large, or one that the scene's stereo mode or layout cannot have.
+    """
+    width, height = arguments.numbers("size", size, 2, "width and height in pixels")
+    if not (min(width, height) >= 1 and max(width, height) <= MAX_SIDE and width * height <= MAX_PIXELS):
+        limits = f"must be from 1 to {MAX_SIDE} pixels a side, and {MAX_PIXELS:,} in all"
+        raise SceneError(f"{limits}; got {width} x {height}", Where(path="size"))
+    found = scene.model_copy(update={"image": scene.image.resized(width, height)})
+    try:
+        check_parts(found)
+    except SceneError as error:
+        if error.where.path and error.where.path.startswith("image"):
+            raise SceneError(error.message, Where(path="size")) from error
+        raise
+    return found
 
 
 def with_lanes(

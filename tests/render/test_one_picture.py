@@ -20,7 +20,7 @@ from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
 from clfractal.work.engine import Engine
-from clfractal.work.sized import with_size
+from clfractal.work.prepare import with_size
 
 BLOCKS = 12
 SCENE = """

@@ -17,7 +17,7 @@ from clfractal.pictures.film import Film
 from clfractal.pictures.probe import CHANNELS, Probe
 from clfractal.scene.model import Scene
 from clfractal.work.engine import Engine
-from clfractal.work.sized import with_size
+from clfractal.work.prepare import with_size
 from tests.render.shots import BALL, BALL_RADIUS, engine_of
 from tests.scenes import scene_of
 from tests.shell import InProcess

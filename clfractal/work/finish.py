@@ -1,14 +1,19 @@
-"""Denoising a job's pictures: each view by itself, once its rays are done and before any tone curve."""
+"""What a job's finished pictures become: each view without noise, before any tone curve, and files."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 
+from clfractal.device.activity import doing
 from clfractal.files.channels import ALBEDO, NOISY, NORMAL
 from clfractal.pictures.denoise import denoised
 from clfractal.pictures.film import Film, in_memory
+from clfractal.pictures.outputs import output_files, save_outputs, save_views
 from clfractal.pictures.tiled import Floats, Picture
 from clfractal.renderers.plan import PlannedView
 from clfractal.scene.model import Scene
@@ -30,6 +35,35 @@ def finished(job: Job, stores: Sequence[Picture]) -> Sequence[Picture]:
     if not job.denoises:
         return stores
     return [_finished(job, view, in_memory(store)) for view, store in zip(job.views, stores, strict=True)]
+
+
+def save_job(
+    job: Job, stores: Sequence[Picture], paths: Sequence[str | Path], header: Mapping[str, Any]
+) -> None:
+    """Writes a finished job's picture to files, as the scene's `output` and `stereo.mode` want them.
+
+    Args:
+        stores: of each view.
+        header: what files tell about the whole picture.
+
+    Raises:
+        FileError: a file cannot be written.
+    """
+    with doing(f"writing {', '.join(str(path) for path in paths)}"):
+        output = job.scene.output
+        stores = finished(job, stores)
+        save = partial(save_outputs, half=output.half_channels, bits=output.png_bits, quality=output.quality)
+        if not job.stays_apart:
+            save(job.picture(stores, header), paths)
+            return
+        eyes = job.eyes(stores)
+        for path in paths:
+            files = output_files(job.scene.stereo, path)
+            if len(files) == 2:
+                for eye, file in zip((eyes["left"], eyes["right"]), files, strict=True):
+                    save(eye, [file])
+            else:
+                save_views(eyes["left"], eyes["right"], path, half=output.half_channels)
 
 
 def darkness_is_certain(scene: Scene) -> bool:
