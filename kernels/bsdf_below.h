@@ -1,4 +1,5 @@
 // Boundaries that light goes below and comes from: what a material's layers are for it.
+#include "bsdf_record.h"
 
 // Where light comes out, `emerges`, the boundary lets it through as that of a white diffuse body does, and there is nothing over it: what
 // lies there was reckoned where light went in. From inside glass nothing goes below its boundary.

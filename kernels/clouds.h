@@ -1,6 +1,6 @@
 // Clouds: volumes among the objects that light goes through, along paths. Where they overlap, their extinctions add up, so the first place
 // where any of them scatters a path is where it is scattered.
-#define NUDGE GRID_NUDGE
+#include "volume_track.h"
 
 // One of the numbers that the transfer table has for a value.
 INLINE real cloud_number(grid_ray r, real value, int column) {
@@ -12,7 +12,6 @@ INLINE real cloud_number(grid_ray r, real value, int column) {
     return between(gather_floats(table, entry), gather_floats(table, entry + CLOUD_COLUMNS), at - to_reals(first));
 }
 
-// What `volume_track.h` asks of a ray through a grid.
 INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until) {
     const grid_cell c = grid_cell_at(grid_place(&r, number + GRID_NUDGE), r.o);
     *until = grid_cell_end(&r, c, active & ~active, number);
@@ -29,8 +28,6 @@ INLINE real extinction_at(grid_ray r, real value, world w) { return cloud_number
 // What shines in clouds is looked for at places of its own (`clouds_shine`).
 INLINE int shines_itself(world w) { return 0; }
 INLINE color emission_of(real value, world w) { return color_of(R(0.0), R(0.0), R(0.0)); }
-
-#include "volume_track.h"
 
 // The part of a cloud's box on a ray before `far`; the result says where there is one.
 INLINE mask cloud_entered(int number, vec origin, vec direction, real far, world w, grid_ray *r) {

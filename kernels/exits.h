@@ -1,4 +1,7 @@
 // The surface where rays within glass leave the set.
+#include "march_inside.h"
+#include "share.h"
+#include "surface_at.h"
 
 #define EXIT_GRAZES R(0.05)   // least cosine of a ray with the normal where it leaves the set
 

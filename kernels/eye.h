@@ -1,5 +1,6 @@
 // Rays from the eye.
 #include "objects.h"
+#include "state.h"
 
 // Whether a surface is one that marches find: of the set or a part of it, and not of an object beside it.
 INLINE mask of_the_set(real object, world w) {
@@ -94,3 +95,5 @@ INLINE int paths_are_over(stage s) {
     if (KEEPS(s, STATE_HALT)) left |= ~equal(lanes_load(state_part(s, STATE_HALT)), R(0.0));
     return !any_lane(left);
 }
+// The head of a stage along paths: packets end whose paths are over.
+#define PATH_STAGE_BEGINS(name, data) STAGE_BEGINS(name, data); if (paths_are_over(name)) return

@@ -3,9 +3,6 @@
 #include "rays.h"
 #include "queue.h"
 #include "arguments.h"
-#include "march_inside.h"
-#include "share.h"
-#include "surface_at.h"
 #include "exits.h"
 
 STAGE(march_inside) {

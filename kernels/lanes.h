@@ -197,5 +197,3 @@ typedef __global const struct Object *object_record;
 typedef __global const struct CutPlane *plane_record;
 typedef __global const struct Map *map_record;
 typedef __constant const scalar *constants;
-
-#include "repairs.h"

@@ -1,6 +1,10 @@
 // How paths ask lights, whatever they leave: a surface or a place in a medium. What a path could also have met by chance is weighed by the
 // power heuristic (Veach and Guibas 1995).
 
+// Lights beside those that are listed: what they add to the sum of all weights, and the one of them that is chosen, if one is.
+INLINE real with_lights_beside(real sum, vec point, real own, world w);
+INLINE void lights_beside_asked(choosing *c, const real *numbers, world w);
+
 // What could light a point from everywhere: the sum over the lights, and the environment. `own`: the object whose surface it is, or 0; no
 // object lights itself.
 INLINE real weight_of_all(vec point, real own, world w) {

@@ -63,6 +63,9 @@ CALLED real light_weight(light_record light, const vec *point) {
     return LIGHT_PI * light_at(light, *point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
 }
 
+// The same as below, of the lights on a set.
+INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w);
+
 // The nearest light that a ray meets before `far`, its number, or -1; the eye's own rays see only visible ones.
 CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     mask met = less(R(1.0), R(0.0));

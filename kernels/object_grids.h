@@ -2,6 +2,7 @@
 // one buffer (`clfractal/renderers/object_grids.py`): values, x fastest, and of each brick of 8 x 8 x 8 cells its least and its largest
 // one. The cells at the rim go half a voxel beyond the outermost middles, where values go on as they are.
 #include "gather.h"
+#include "object_span.h"
 
 #define GRID_NUDGE R(0.002)   // past a side, so that a place is beyond it in spite of rounding; in sides of a voxel
 #define ROOT_STEPS 64    // at most: so many halves are more than a number has digits

@@ -1,7 +1,6 @@
 // What all texts include that ask the formula.
-#include "lanes.h"
 #include "numbers/real.h"
-#include "numbers/dual.h"
+#include "numbers/powers.h"
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"

@@ -1,7 +1,8 @@
-// A renderer whose kernel takes its shots from beginning to end. It defines before this file: `world`, what its shots read, and
-//   shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost)
-// which takes one shot at (across, below), in pixels from each pixel's middle.
+// A renderer whose kernel takes its shots from beginning to end. It defines before this file `world`, what its shots read.
 #include "passes.h"
+
+// Takes one shot at (across, below), in pixels from each pixel's middle.
+INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost);
 
 // One work-item's part of a pass by a renderer whose kernel takes its shots from beginning to end.
 CALLED void render_packet(int packet, int tile, pass s, world w) {

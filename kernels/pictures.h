@@ -1,5 +1,4 @@
 // What texts of pictures include, whether they know a formula or not.
-#include "lanes.h"
 #include "numbers/real.h"
 #include "vectors.h"
 #include "structs.h"

@@ -1,5 +1,7 @@
-// What is seen of cut planes in the picture of an object: the formula at places of them. Who includes it says what planes cut beside the set:
-//   mask cut_objects_hold(int plane, vec point, plane_set set), whether a place is inside an object that a plane cuts.
+// What is seen of cut planes in the picture of an object: the formula at places of them.
+
+// Whether a place is inside an object that a plane cuts.
+INLINE mask cut_objects_hold(int plane, vec point, plane_set set);
 
 // Where the formula is evaluated for a point of the picture: elsewhere if a volume is zoomed.
 INLINE vec plane_place(vec point, plane_record plane) {

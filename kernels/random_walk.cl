@@ -7,9 +7,6 @@
 #include "set_lights.h"
 #include "light_places.h"
 #include "flights.h"
-#include "march_inside.h"
-#include "share.h"
-#include "surface_at.h"
 #include "exits.h"
 #include "random_walk.h"
 

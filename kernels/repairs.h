@@ -1,6 +1,8 @@
 // Built-in functions that some drivers compute wrongly for packets, replaced under their own names, so that other files
 // need not know. Most are faults where an unusual argument in one lane spoils its neighbours; where that cannot matter (LANES
 // is 1) nothing is changed. `clfractal/device/probe.py` tries packets of mixed lanes on every device.
+#include "lanes.h"
+
 #if !REAL_IS_DOUBLE
 // SLEEF again: where denormal numbers count as zero, pow of a denormal number is meaningless (1.4e-45 ^ 2 = 1.9e-4).
 INLINE real normal_pow(real x, real y) { return pow(pick(less(fabs(x), (real)(REAL_SMALLEST)), x * R(0.0), x), y); }

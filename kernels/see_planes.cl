@@ -3,8 +3,8 @@
 #include "stages.h"
 #include "escape.h"
 #include "escape_colors.h"
+#include "planes_seen.h"
 
-// Whether a place is inside an object that a plane cuts.
 INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
     mask held = less(R(1.0), R(0.0));
     for (int object = 0; object < MOST_OBJECTS; ++object) {
@@ -12,7 +12,6 @@ INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
     }
     return held;
 }
-#include "planes_seen.h"
 
 // Finds where a plane opens the set on the ray that was sent for the next spot: there its face is met, and no ray goes on. (Of objects
 // beside the set stages know that by themselves, see `surface_met`.)

@@ -3,6 +3,10 @@
 // From the build: CHUNK, applications between two looks at a packet, a multiple of the chain's cycle; REPEATS_FROM, the
 // application from which on a chain's turns repeat themselves.
 
+// Packets whose orbits are computed side by side, so that one goes on while another waits for a result. Where there is one
+// lane, the device has other work-items for that.
+#define PACKETS (LANES == 1 ? 1 : 2)
+
 // The square of how far apart two states are, where orbits may come back.
 INLINE real apart_square(state z, state past) {
     state apart;

@@ -53,5 +53,3 @@ INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *st
     if (IS_BEYOND) return;                                                                                                 \
     STAGE_OF(name);                                                                                                        \
     const world data = WORLD
-// The same along paths, where packets end whose paths are over.
-#define PATH_STAGE_BEGINS(name, data) STAGE_BEGINS(name, data); if (paths_are_over(name)) return

@@ -1,4 +1,5 @@
 // What is kept of a shot between its stages, for each pixel of a wave; `clfractal/renderers/state.py` declares it.
+#include "stage.h"
 
 INLINE mask on_face(const spot *here) { return is_face(here->object); }
 

@@ -5,7 +5,7 @@
 #include "pictures.h"
 #include "grid.h"
 #include "volume_ray.h"
-#include "passes.h"
+#include "packets.h"
 
 // The ray of a sample, and its place in the shutter's time.
 INLINE ray sample_ray(const packet_pixels *at, real across, real below, int sample, world w, real *time) {

@@ -1,4 +1,5 @@
 // Pictures of grids that ask no formula: normals are blended, and there are no planes.
+#include "volume_sight.h"
 
 // The normal of a surface at a place that has this one by the samples around it.
 INLINE vec normal_there(vec point, vec blended, mask active, world w) { return blended; }

@@ -10,7 +10,6 @@ INLINE real axis_left(ints at, ints shift, ints side, ints back, int sides, real
     return pick(inner, place * per_step + passed, (real)(REAL_LARGEST));
 }
 
-// What a flight may meet: the bound of its extinction, and where that ends.
 INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until) {
     const cell c = cell_at(place_of(r, number + NUDGE), w.grid.about);
     const ints entry = brick_at(c, w.grid);
@@ -22,7 +21,7 @@ INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until)
     const real y = axis_left(c.y, shift, side, r.back[1], w.grid.about->sides[1], r.per_step.y, r.passed.y);
     const real z = axis_left(c.z, shift, side, r.back[2], w.grid.about->sides[2], r.per_step.z, r.passed.z);
     const real first = least(x, y);
-    *until = least(first, z);
+    *until = most(least(first, z), number + NUDGE);
     return pick(stored & active, gather_floats(w.bounds, pick_ints(stored, entry, (ints)(0))), R(0.0));
 }
 

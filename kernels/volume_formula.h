@@ -1,13 +1,12 @@
 // What pictures of grids ask the formula by themselves: planes, and normals where rays meet a surface.
-#include "numbers/dual.h"
-#include "formula.h"
-#include "solids.h"
+#include "orbits.h"
+#include "volume_sight.h"
 #include "escape.h"
 #include "escape_colors.h"
-
-INLINE mask cut_objects_hold(int plane, vec point, plane_set set) { return less(R(1.0), R(0.0)); }
 #include "planes_seen.h"
 #include "volume_exact.h"
+
+INLINE mask cut_objects_hold(int plane, vec point, plane_set set) { return less(R(1.0), R(0.0)); }
 
 INLINE vec normal_there(vec point, vec blended, mask active, world w) {
     return w.settings->exact_normals ? exact_normal(point, blended, active, w) : blended;

@@ -1,6 +1,5 @@
 // Entry point of media in a grid with planes.
 #include "volume.h"
-#include "volume_sight.h"
 #include "volume_formula.h"
 #include "volume_medium.h"
 

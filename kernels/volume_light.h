@@ -1,5 +1,7 @@
-// The light of a place in a grid. Who includes it says what part of light comes through a place that a ray looks at:
-//   real part_through(real value, world w)
+// The light of a place in a grid.
+
+// What part of it comes through a place that a ray looks at.
+INLINE real part_through(real value, world w);
 
 // The part of a light that gets through to a point.
 INLINE real light_through(vec point, vec normal, vec toward, real distance, mask active, world w, real *steps) {

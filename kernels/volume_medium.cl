@@ -1,6 +1,5 @@
 // Entry point of media in a grid.
 #include "volume.h"
-#include "volume_sight.h"
 #include "volume_alone.h"
 #include "volume_medium.h"
 

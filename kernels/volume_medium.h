@@ -1,6 +1,7 @@
 // Media in a grid: places are composited from front to back, until the ray is opaque.
+#include "volume_shot.h"
+
 INLINE real part_through(real value, world w) { return R(1.0) - opacity_of(value, w); }
-#include "volume_light.h"
 
 // Light is the costly part: places are kept until a lane has PENDING of them, and lit together. One lane has no neighbours to wait
 // for, and needs no array.
@@ -61,7 +62,6 @@ INLINE mask sight_step(sight *e, unlit *u, grid_ray g, mask active, real *number
     return active;
 }
 
-// What a ray from the eye sees of the grid.
 INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, const plane_face *face, mask wanted, world w, real *looked) {
     const vec to_viewer = vec_scale(r.direction, R(-1.0));
     quads q = quads_ahead(r, wanted, w);
@@ -79,13 +79,9 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, cons
     sight_quads(e, (real)(REAL_LARGEST), wanted, &q, w);
 }
 
-#include "volume_shot.h"
-
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
     sight e;
     return take_shot(r, at->y + below, time, active, w, &e, &cost->steps);
 }
-
-#include "packets.h"

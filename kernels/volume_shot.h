@@ -1,6 +1,9 @@
-// One sample of a volume's pixel. Who includes it says what a ray sees of the grid, and of the planes between, for lanes `wanted`; those
-// that are `bare` see the face of a plane where the ray begins, and those that are `active` the grid:
-//   void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, const plane_face *face, mask wanted, world w, real *looked)
+// One sample of a volume's pixel.
+#include "volume_light.h"
+
+// What a ray sees of the grid, and of the planes between, for lanes `wanted`; those that are `bare` see the face of a plane where the ray
+// begins, and those that are `active` the grid.
+INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, const plane_face *face, mask wanted, world w, real *looked);
 
 // What is behind all.
 INLINE color background_of(real y, world w) {

@@ -1,6 +1,7 @@
 // Surfaces in a grid: the boundary where the value passes `level`.
+#include "volume_shot.h"
+
 INLINE real part_through(real value, world w) { return pick(less((real)(w.settings->level), value), R(0.0), R(1.0)); }
-#include "volume_light.h"
 
 #define HALVINGS 5   // of the step that met the surface
 
@@ -33,7 +34,6 @@ INLINE mask surface_met(grid_ray g, mask active, world w, real *at, real *looked
     return found;
 }
 
-// What a ray from the eye sees of the grid.
 INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, const plane_face *face, mask wanted, world w, real *looked) {
     sight_add(e, face->tint, R(1.0), face->t, face->count, face->normal, bare, bare);
     const vec to_viewer = vec_scale(r.direction, R(-1.0));
@@ -54,8 +54,6 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, cons
     sight_add(e, light, R(1.0), t, value, normal, found & ~found, found);
 }
 
-#include "volume_shot.h"
-
 INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
@@ -63,5 +61,3 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     const shot s = take_shot(r, at->y + below, time, active, w, &e, &cost->steps);
     return quads_over(s, r, &e, background_of(at->y + below, w), time, active, w);
 }
-
-#include "packets.h"

@@ -1,10 +1,16 @@
 // Unbiased ways through a medium whose density differs from place to place, by a bound of its extinction in each brick: delta tracking
 // (Woodcock et al. 1965) finds where light is scattered, ratio tracking (Novak et al. 2014) what comes through.
 //
-// Lengths are numbers of a grid_ray, which here count sides of a voxel, as extinction does. What a ray meets `volume_bounds.h` tells of a
-// grid in bricks, and `clouds.h` of an object: `bound_at`, `value_met` and `extinction_at`, and whether light
-// that the medium adds is counted on the way (`shines_itself`), which light (`emission_of`).
+// Lengths are numbers of a grid_ray, which here count sides of a voxel, as extinction does.
 #define MOST_FLIGHTS 1000000    // that may end within one ray
+
+// What a ray meets, told by `volume_bounds.h` of a grid in bricks and by `clouds.h` of an object: the bound of extinction at a place and
+// the number past it where that ends; the value there, if there is one; its extinction; whether light is added on the way, and which.
+INLINE real bound_at(grid_ray r, real number, mask active, world w, real *until);
+INLINE mask value_met(grid_ray r, real number, mask active, world w, real *value);
+INLINE real extinction_at(grid_ray r, real value, world w);
+INLINE int shines_itself(world w);
+INLINE color emission_of(real value, world w);
 
 // Random numbers of a lane, as many as it needs, whatever the others need.
 typedef struct {
@@ -34,7 +40,6 @@ INLINE mask flight(grid_ray r, stream *random, real *number, real far, mask *act
     const real u = stream_next(random, *active);
     const mask some = less(R(0.0), *bound);
     const real ends = *number - log(u) / pick(some, *bound, R(1.0));
-    until = most(until, *number + NUDGE);
     const mask tries = *active & some & less(ends, until) & less(ends, far);
     *number = pick(*active, pick(tries, ends, until), *number);
     *active &= less(*number, far);

@@ -1,10 +1,6 @@
 // Voxels as the fill evaluates them: bricks of 8 x 8 x 8, each voxel in one brick only (stored bricks have a ninth layer).
 #include "orbits.h"
 #include "bricks.h"
-
-// Packets whose orbits are computed side by side, so that one goes on while another waits for a result. Where there is one
-// lane, the device has other work-items for that.
-#define PACKETS (LANES == 1 ? 1 : 2)
 #include "solid_inside.h"
 
 // Voxels are in the order of a brick's octants, 4 x 4 x 4 (x fastest, in and between them): packets that are compact end

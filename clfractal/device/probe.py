@@ -24,7 +24,7 @@ _TOLERANCE: dict[Precision, float] = {"float32": 3e-6, "float64": 1e-14}
 _COUNTS_MAY_DIFFER = 0.01
 _MANY_TURNS = 1e7
 
-_HEADERS = '#include "lanes.h"\n#include "probe.cl"\n'
+_HEADERS = '#include "repairs.h"\n#include "probe.cl"\n'
 
 
 def lanes_job(request: Mapping[str, Any]) -> dict[str, Any]:

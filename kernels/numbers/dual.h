@@ -113,5 +113,3 @@ INLINE dual dual_pow(dual x, dual y) {
     const real value = real_pow(x.v, y.v);
     return dual_chain2(value, real_power_slope(x.v, y.v), x, real_power_log(value, x.v), y);
 }
-
-#include "powers.h"

@@ -1,6 +1,7 @@
 // Powers whose exponent is data, the same for all lanes: a whole exponent by repeated squaring, any other by logarithm and angles.
 //
 // `twice` is 2 n where that is a whole number (|n| up to 1024), else 0: even for whole exponents, odd for those that are a half more.
+#include "dual.h"
 
 typedef struct {
     real re, im;

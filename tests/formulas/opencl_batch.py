@@ -27,7 +27,7 @@ _INCLUDES = re.compile(
 
 HEAD = "".join(
     f'#include "{name}"\n'
-    for name in ("lanes.h", "numbers/real.h", "numbers/dual.h", "numbers/quick.h", "vectors.h", "structs.h")
+    for name in ("lanes.h", "numbers/real.h", "numbers/powers.h", "numbers/quick.h", "vectors.h", "structs.h")
 )
 
 

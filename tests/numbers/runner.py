@@ -14,7 +14,7 @@ from tests.small_kernels import LOADS, SmallKernels
 _HEAD = """\
 #include "lanes.h"
 #include "numbers/real.h"
-#include "numbers/dual.h"
+#include "numbers/powers.h"
 #include "vectors.h"
 
 """
