@@ -39,9 +39,11 @@ def kernel_file(name: str) -> str:
 def numbered(text: str, number: int) -> str:
     """The text with `_f<number>` after every name that it defines (but not after members, `light->color`).
 
-    JOINED stays as it is: all formulas of a batch stand alone, and headers that they share read it.
+    JOINED stays as it is: all formulas of a batch stand alone, and headers that they share read it. So do the numbers
+    of shapes, which are the same for all.
     """
     names = {name for found in _DEFINED.findall(text) for name in found if name} - {"JOINED"}
+    names = {name for name in names if not name.startswith("SHAPE_")}
     for listed in re.findall(r"^enum \{([^}]*)\};", text, re.MULTILINE):
         names |= set(re.findall(r"\w+", listed))
     pattern = rf"(?<!->)\b({'|'.join(sorted(names, key=len, reverse=True))})\b"
