@@ -14,7 +14,7 @@ STAGE(send_air) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const spot found = spot_kept(s, 0);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     const ray r = eye_ray(&a, w.view);
     const real far = way_in_fog(s, r, &found, w);
     for (int i = 0; i < w.settings->light_count; ++i) {
@@ -32,7 +32,7 @@ STAGE(gather_air) {
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const spot found = spot_kept(s, 0);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     const ray r = eye_ray(&a, w.view);
     const real far = way_in_fog(s, r, &found, w);
     color air = color_of(R(0.0), R(0.0), R(0.0));

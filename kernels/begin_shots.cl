@@ -15,8 +15,8 @@ STAGE(begin_shots) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);
-    const aim a = aim_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
-    aim_keep(s, &a);
+    const camera_sample a = camera_sample_of(s, &here, sample_wanted(s.span, &here.at, &p, sample));
+    camera_sample_keep(s, &a);
     if (sample == first) count_waits_from(s.span, &here);
     counters cost = {R(0.0), R(0.0), R(0.0)};
     start_of_rays begin = {R(0.0)};

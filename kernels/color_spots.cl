@@ -33,7 +33,7 @@ STAGE(color_spots) {
     const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
     if (!any_lane(settings->asked_count > 0 ? seen : found)) return;
     path so_far;
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     spot there = here;
     const real width = HAS(w, BUMP) ? bump_width(&here, w) : R(-1.0);

@@ -25,7 +25,7 @@ INLINE void block_middles(pass s, int first, int count, int first_tile, real *x,
 
 // The middle ray of a block as wide as all rays of its pixels, and `margin` more: `reach` pixels to each side.
 INLINE ray block_cone(real x, real y, real reach, world w) {
-    aim at = {R(1.0), x, y, R(0.0), R(0.0), R(0.0), R(0.0)};
+    camera_sample at = {R(1.0), x, y, R(0.0), R(0.0), R(0.0), R(0.0)};
     ray axis = eye_ray(&at, w.view);
     real footprint = R(0.0), spread = R(0.0);
     for (int corner = 0; corner < TURNS(4); ++corner) {

@@ -30,12 +30,12 @@ INLINE pixel sums_before(stage s, const place_in_pass *here) {
     return p;
 }
 
-CALLED ray eye_ray(const aim *a, view_record view) { return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view); }
+CALLED ray eye_ray(const camera_sample *a, view_record view) { return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view); }
 
-INLINE aim aim_of(stage s, const place_in_pass *here, mask wanted) {
+INLINE camera_sample camera_sample_of(stage s, const place_in_pass *here, mask wanted) {
     real across, below;
     sample_offset(s.span, &here->at, s.sample, &across, &below);
-    aim a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
+    camera_sample a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
     sample_of_lens(&here->at, s.sample, (uint)s.span.sampling->seed, s.span.view, &a.lens_x, &a.lens_y, &a.time);
     return a;
 }

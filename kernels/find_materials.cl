@@ -16,7 +16,7 @@ STAGE(find_materials) {
     if (paths_are_over(s)) return;
     spot here = spot_kept(s, bounce);
     if (!any_lane(mask_of(here.found))) return;
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     mask emerges = less(R(1.0), R(0.0));

@@ -9,7 +9,7 @@
 STAGE(find_spots) {
     STAGE_BEGINS(s, w);
     if (HAS(w, PATHS) && paths_are_over(s)) return;
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     const ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);

@@ -33,7 +33,7 @@ STAGE(gather_paths) {
 // have a part of its weight.
 STAGE(end_paths) {
     STAGE_BEGINS(s, w);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     STATE_KEPT(s, path, so_far, STATE_PATH);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     carried with = carried_kept(s);

@@ -46,7 +46,7 @@ INLINE real glow_along(ray r, mask active, bits seed, counters *cost, world w, o
 STAGE(add_glow) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     const spot found = spot_kept(s, bounce);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);

@@ -13,7 +13,7 @@
 // Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
 STAGE(light_spots) {
     STAGE_BEGINS(s, w);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     spot found = spot_kept(s, bounce);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     path so_far;

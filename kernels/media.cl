@@ -9,7 +9,7 @@ STAGE(cross_media) {
     PATH_STAGE_BEGINS(s, w);
     const int is_last = bounce > w.settings->bounces;
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     carried with;

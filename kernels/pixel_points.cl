@@ -8,7 +8,7 @@
 STAGE(send_points) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     queue of_set = s.q;
     of_set.objects = 0;
     const encounter end_of_cone = queue_met(of_set, 0, s.slot);
@@ -25,7 +25,7 @@ STAGE(send_points) {
 STAGE(join_points) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     STATE_KEPT(s, touch, touched, STATE_TOUCH);
     sighting at_first = {R(0.0), cost.steps};

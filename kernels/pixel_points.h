@@ -37,7 +37,7 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
 }
 
 // Sends a ray for each point, from a little before where the pixel's cone touched on (for the search by steps: from the eye).
-INLINE void points_send(stage s, aim a, touch touched, ray pixel_ray, bits seed, world w) {
+INLINE void points_send(stage s, camera_sample a, touch touched, ray pixel_ray, bits seed, world w) {
     const real cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
     const int count = w.settings->point_count;
     for (int turn = 0; turn < count; ++turn) {

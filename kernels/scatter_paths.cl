@@ -17,7 +17,7 @@ INLINE void path_leaves(stage s, const packet_pixels *at, path *so_far, carried 
 STAGE(scatter_paths) {
     PATH_STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     spot found = spot_kept(s, bounce);
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);

@@ -17,7 +17,7 @@ INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
 // beside the set stages know that by themselves, see `surface_met`.)
 STAGE(find_faces) {
     STAGE_BEGINS(s, w);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     real from;
@@ -35,7 +35,7 @@ STAGE(find_faces) {
 // part of its own quad that is at the same place.
 STAGE(find_planes) {
     STAGE_BEGINS(s, w);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     const spot found = spot_kept(s, 0);
     const ray r = eye_ray(&a, view);
     const real way = vec_dot(vec_sub(found.seen, r.origin), r.direction);

@@ -33,7 +33,7 @@ INLINE void aovs_once(stage s, color seen) {
 }
 
 // The shot at its end: what its path has seen, over the background; and what it has found first.
-INLINE shot shot_of(stage s, aim a, ray from_eye, color seen, const spot *here, world w) {
+INLINE shot shot_of(stage s, camera_sample a, ray from_eye, color seen, const spot *here, world w) {
     STATE_KEPT(s, sighting, first, STATE_SIGHTING);
     spot found = *here;
     if (s.bounce > 0) found = spot_kept(s, 0);
@@ -120,7 +120,7 @@ INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, sh
 }
 
 // Adds the shots to their pixels' sums; after the launch's last sample these are written.
-INLINE void end_shots(stage s, aim a, color seen, const spot *here, counters cost, world w) {
+INLINE void end_shots(stage s, camera_sample a, color seen, const spot *here, counters cost, world w) {
     const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
     const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);

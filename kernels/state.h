@@ -8,7 +8,7 @@ INLINE mask on_face(const spot *here) { return is_face(here->object); }
 #define BUMP_PLACES 3
 
 #define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
-typedef char structs_are_small[FEW(aim) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
+typedef char structs_are_small[FEW(camera_sample) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
 
 // What has halted a path before what it had met.
 #define HALTED_BY_GLASS R(1.0)   // which has scattered it
@@ -47,13 +47,13 @@ INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return 
         SLICES(RECALL_SLICE, RECALL_SLICE_NEEDED)                                                                           \
         return thing;                                                                                                       \
     }
-OF_SLICES(aim, AIM_SLICES, {R(0.0)})
+OF_SLICES(camera_sample, CAMERA_SAMPLE_SLICES, {R(0.0)})
 OF_SLICES(spot, SPOT_SLICES, {R(0.0)})
 #define IN_THE_OPEN ((carried){.wave = R(-1.0), .flight = (real)(REAL_LARGEST)})
 OF_SLICES(carried, CARRIED_SLICES, IN_THE_OPEN)
 
-#define aim_keep(s, a) aim_keep_one(s, a, 0)
-#define aim_kept(s) aim_kept_one(s, 0)
+#define camera_sample_keep(s, a) camera_sample_keep_one(s, a, 0)
+#define camera_sample_kept(s) camera_sample_kept_one(s, 0)
 // The first spot, or that after the last bounce.
 #define spot_keep(s, here, bounce) spot_keep_one(s, here, (bounce) > 0)
 #define spot_kept(s, bounce) spot_kept_one(s, (bounce) > 0)

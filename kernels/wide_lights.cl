@@ -16,7 +16,7 @@ STAGE(gather_light) {
     spot found = spot_kept(s, bounce);
     if (!any_lane(mask_of(found.found))) return;
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
@@ -29,7 +29,7 @@ STAGE(gather_light) {
 STAGE(meet_lights) {
     STAGE_BEGINS(s, w);
     spot found = spot_kept(s, bounce);
-    const aim a = aim_kept(s);
+    const camera_sample a = camera_sample_kept(s);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     path_meets_light(s, &so_far, &found, arrived, w);

@@ -51,16 +51,16 @@ def _carried(name: str, meaning: str, *members: tuple[Kind, str, str]) -> Carrie
     return Carried(name, meaning, tuple(Member(*member) for member in members))
 
 
-AIM_AT = _carried(
-    "aim_at",
+FILM_SAMPLE = _carried(
+    "film_sample",
     "Where the shot goes to in the picture.",
     ("real", "wanted", "whether the pixel takes this sample"),
     ("real", "x", "pixels from the picture's left side ..."),
     ("real", "y", "... and from its top"),
     ("real", "offset", "distance squared from the pixel's middle, pixels"),
 )
-THROUGH_LENS = _carried(
-    "through_lens",
+LENS_SAMPLE = _carried(
+    "lens_sample",
     "Where the shot goes through the lens, and when.",
     ("real", "lens_x", "lens radii from its middle"),
     ("real", "lens_y", ""),
@@ -181,12 +181,16 @@ def _whole(name: str, meaning: str, *slices: Carried) -> Carried:
 
 
 # Things of slices, of which a scene may not need the last ones.
-AIM = _whole("aim", "Where the shot goes to.", AIM_AT, THROUGH_LENS)
+CAMERA_SAMPLE = _whole("camera_sample", "Where the shot goes to.", FILM_SAMPLE, LENS_SAMPLE)
 SPOT = _whole("spot", "A place on the surface.", SPOT_SEEN, SPOT_THING)
 CARRIED = _whole(
     "carried", "What a path of light carries from a spot to the next.", ASKED_LIGHT, WITHIN, FLIGHT
 )
-SLICES = {AIM: (AIM_AT, THROUGH_LENS), SPOT: (SPOT_SEEN, SPOT_THING), CARRIED: (ASKED_LIGHT, WITHIN, FLIGHT)}
+SLICES = {
+    CAMERA_SAMPLE: (FILM_SAMPLE, LENS_SAMPLE),
+    SPOT: (SPOT_SEEN, SPOT_THING),
+    CARRIED: (ASKED_LIGHT, WITHIN, FLIGHT),
+}
 FACE = _carried(
     "plane_face",
     "Where a plane opens the set on the way to the next spot.",
@@ -265,7 +269,7 @@ TYPES = (
     PIXEL,
     PARTS_OF_LIGHT,
     MATTES,
-    AIM,
+    CAMERA_SAMPLE,
     SIGHTING,
     START,
     TOUCH,

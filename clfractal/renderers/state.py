@@ -11,16 +11,17 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from clfractal.renderers.carried import (
-    AIM_AT,
     AOVS,
     ASKED_LIGHT,
     COUNTERS,
     FACE,
     FACET,
+    FILM_SAMPLE,
     FLIGHT,
     HALT,
     LAMP_BEFORE,
     LAYERS,
+    LENS_SAMPLE,
     MATTES,
     PARTS_OF_LIGHT,
     PATH,
@@ -30,7 +31,6 @@ from clfractal.renderers.carried import (
     SPOT_SEEN,
     SPOT_THING,
     START,
-    THROUGH_LENS,
     TOUCH,
     WITHIN,
 )
@@ -86,8 +86,8 @@ def normal_count(scene: Scene) -> int:
 
 
 PARTS = (
-    Part("AIM_AT", AIM_AT.numbers, lambda scene, plan: 1),
-    Part("THROUGH_LENS", THROUGH_LENS.numbers, lambda scene, plan: int(has_lens(scene) or plan.moving)),
+    Part("FILM_SAMPLE", FILM_SAMPLE.numbers, lambda scene, plan: 1),
+    Part("LENS_SAMPLE", LENS_SAMPLE.numbers, lambda scene, plan: int(has_lens(scene) or plan.moving)),
     Part("SIGHTING", SIGHTING.numbers, lambda scene, plan: 1),
     Part("COUNTERS", COUNTERS.numbers, lambda scene, plan: 1),
     Part("SUMS", PIXEL.numbers, lambda scene, plan: 1),
