@@ -37,7 +37,7 @@ STAGE(gather_air) {
     const real far = way_in_fog(s, r, &found, w);
     color air = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
-        const encounter met = queue_met(s.q, next_turns + i, s.slot);
+        const ray_hit met = queue_met(s.q, next_turns + i, s.slot);
         counters_met(&cost, met, 0);
         air = color_pick(mask_of(met.hit), air, color_add(air, scattered(s, &here.at, r, far, i, w).light));
     }

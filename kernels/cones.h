@@ -57,7 +57,7 @@ INLINE void cones_send(pass s, queue q, int first, int first_tile, world w) {
     const mask meets = ray_clip(&r, w.settings->bounds_center, radius + widest);
     queue_send(q, 0, first, r, meets);
     // Nobody marches what does not meet the bounds: nothing is there.
-    encounter e = {0};
+    ray_hit e = {0};
     e.t = (real)(REAL_LARGEST);
     KEEP_NUMBERS((const real *)&e, SHADOW_NUMBERS, q.met + first, q.stride);
 }

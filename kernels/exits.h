@@ -13,7 +13,7 @@ INLINE queue inside_of(__global scalar *rays, __global scalar *met, int wave, in
 // Looks at the surfaces where rays of a queue from number `at` on leave the set. It is the surface that a ray meets which comes
 // the other way; its normal is told on the side of the inside.
 INLINE void look_inside(queue q, int at, march_record settings, orbit_record orbit, constants k) {
-    encounter e = queue_met(q, 0, at);
+    ray_hit e = queue_met(q, 0, at);
     mask hit = mask_of(e.hit);
     hit &= ~less(R(0.0), queue_object(q, 0, at, e));
     if (!any_lane(hit)) return;
@@ -36,7 +36,7 @@ INLINE void look_inside(queue q, int at, march_record settings, orbit_record orb
     e.normal = vec_pick(less(facing, EXIT_GRAZES), turned, e.normal);
     e.touch = beyond - e.touch;
     e.t = t;
-    encounter_keep_surface(q, at, &e);
+    ray_hit_keep_surface(q, at, &e);
 }
 
 // The same for a packet's share, which has been marched; `waits` are counted in the launch's statistics.

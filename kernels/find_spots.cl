@@ -15,7 +15,7 @@ STAGE(find_spots) {
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     real object;
     vec place;
-    encounter seen = surface_met(s, 0, r, &object, &place, w);
+    ray_hit seen = surface_met(s, 0, r, &object, &place, w);
     if (bounce > 0 && HAS(w, GLASS_SET)) seen = met_within(s, r, seen, &object, &place, w);
     counters_met(&cost, seen, 1);
     const sighting at_first = {seen.hit, seen.steps};

@@ -15,7 +15,7 @@ STAGE(gather_paths) {
     STATE_KEPT(s, path, so_far, STATE_PATH);
     carried with = carried_kept(s);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
-    const encounter answer = queue_met(s.q, 0, s.slot);
+    const ray_hit answer = queue_met(s.q, 0, s.slot);
     counters_met(&cost, answer, 0);
     so_far.seen = color_pick(mask_of(answer.hit), so_far.seen, color_add(so_far.seen, with.awaited));
     STATE_KEEP(s, cost, STATE_COUNTERS);
@@ -37,7 +37,7 @@ STAGE(end_paths) {
     STATE_KEPT(s, path, so_far, STATE_PATH);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     carried with = carried_kept(s);
-    const encounter last = queue_met(s.q, 0, s.slot);
+    const ray_hit last = queue_met(s.q, 0, s.slot);
     counters_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
     if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));

@@ -18,7 +18,7 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, counters *
     const look l = look_of(here, w);
     for (int turn = 0; turn < w.settings->light_count; ++turn) {
         light_record light = w.lights + turn;
-        const encounter met = queue_met(s.q, turn, s.slot);
+        const ray_hit met = queue_met(s.q, turn, s.slot);
         counters_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;

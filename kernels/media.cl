@@ -27,7 +27,7 @@ STAGE(cross_media) {
     spot found = spot_kept(s, bounce);
     real far = way_to_spot(&found, arrived);
     if (is_last) {
-        const encounter last = queue_met(s.q, 0, s.slot);
+        const ray_hit last = queue_met(s.q, 0, s.slot);
         far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
         if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
     }

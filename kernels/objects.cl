@@ -39,7 +39,7 @@ STAGE(look_at_objects) {
     const world w = WORLD;
     const int at = ITEM * LANES;
     if (at >= q.turns * q.wave || WAS_CANCELLED) return;
-    const encounter seen = queue_met(q, 0, at);
+    const ray_hit seen = queue_met(q, 0, at);
     const real number = queue_object(q, 0, at, seen);
     const mask here = less(R(0.0), number);
     if (!any_lane(here)) return;
@@ -48,12 +48,12 @@ STAGE(look_at_objects) {
     vec place = objects_place(&point, number, w.objects, settings->object_count);
     vec normal = objects_normal(&point, &r.direction, number, w.objects, settings->object_count, w.tables);
     const real thing = objects_faced(r.origin, r.direction, number, w.objects, w.planes, settings->object_count, &normal, point, &place);
-    encounter found = encounter_kept(q, at);
+    ray_hit found = ray_hit_kept(q, at);
     found.normal = vec_pick(here, normal, found.normal);
     found.smooth = pick(here, face_count(thing, w), found.smooth);
     found.more_steps = pick(here, R(0.0), found.more_steps);
     found.more_count = pick(here, R(0.0), found.more_count);
-    encounter_keep_surface(q, at, &found);
+    ray_hit_keep_surface(q, at, &found);
     __global scalar *numbers = q.rays + at;
     const real before = lanes_load(numbers + RAY_OBJECT_NUMBER * q.stride);
     lanes_store(pick(here, thing, before), numbers + RAY_OBJECT_NUMBER * q.stride);

@@ -83,7 +83,7 @@ INLINE void spot_shines(stage s, path *so_far, const carried *with, const spot *
 }
 
 // Adds the light of an object that the last ray of a path has met, as far as the path could also have asked for it.
-INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, encounter last, mask here, world w) {
+INLINE void path_ends_at_emitter(stage s, path *so_far, const carried *with, ray_hit last, mask here, world w) {
     const real number = queue_object(s.q, 0, s.slot, last);
     const color light = emitter_light(number, w);
     here &= less(R(0.0), brightest(light));

@@ -11,7 +11,7 @@ STAGE(send_points) {
     const camera_sample a = camera_sample_kept(s);
     queue of_set = s.q;
     of_set.objects = 0;
-    const encounter end_of_cone = queue_met(of_set, 0, s.slot);
+    const ray_hit end_of_cone = queue_met(of_set, 0, s.slot);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     counters_met(&cost, end_of_cone, 0);
     cost.bad += end_of_cone.bad;
@@ -35,7 +35,7 @@ STAGE(join_points) {
         const ray each = queue_ray(s.q, turn, s.slot);
         real object;
         vec place;
-        const encounter met = surface_met(s, turn, each, &object, &place, w);
+        const ray_hit met = surface_met(s, turn, each, &object, &place, w);
         counters_met(&cost, met, 1);
         at_first.steps += met.steps;
         points_add(s, &points, turn, each, met, object, place, w);

@@ -64,7 +64,7 @@ INLINE void points_place(pixel_points *p, int point, int rows, mask found, vec p
     }
 }
 
-INLINE void points_add(stage s, pixel_points *p, int turn, ray r, encounter met, real object, vec base, world w) {
+INLINE void points_add(stage s, pixel_points *p, int turn, ray r, ray_hit met, real object, vec base, world w) {
     const mask found = mask_of(met.hit);
     const vec point = vec_along(r.origin, met.t, r.direction);
     p->count += met.hit;

@@ -15,8 +15,8 @@ typedef struct {
     real more_steps, more_count;   // ... and what finding these has cost
     real solid;                    // the number of the object that the surface belongs to, or 0
     real other, part;              // where two flow together: likewise of the other one, and its part of the colour
-} encounter;
-NUMBERS_PICKED(encounter)
+} ray_hit;
+NUMBERS_PICKED(ray_hit)
 
 // Places of numbers in these structs.
 #define RAY_NEAR 6
@@ -82,8 +82,8 @@ INLINE ray queue_ray(queue q, int turn, int first) {
 }
 
 // What is kept of it; lanes that have met nothing hold anything.
-INLINE encounter encounter_kept(queue q, int at) {
-    encounter e = {0};
+INLINE ray_hit ray_hit_kept(queue q, int at) {
+    ray_hit e = {0};
     RECALL_NUMBERS((real *)&e, ENCOUNTER_SOLID, q.met + at, q.stride);
     if (q.numbers > ENCOUNTER_SOLID) e.solid = lanes_load(q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
@@ -94,7 +94,7 @@ INLINE encounter encounter_kept(queue q, int at) {
 }
 
 // Keeps what has been found out about a surface.
-INLINE void encounter_keep_surface(queue q, int at, const encounter *e) {
+INLINE void ray_hit_keep_surface(queue q, int at, const ray_hit *e) {
     KEEP_NUMBERS((const real *)e + ENCOUNTER_SURFACE, ENCOUNTER_SOLID - ENCOUNTER_SURFACE, q.met + ENCOUNTER_SURFACE * q.stride + at, q.stride);
     if (q.numbers > ENCOUNTER_SOLID) lanes_store(e->solid, q.met + ENCOUNTER_SOLID * q.stride + at);
     if (q.numbers > ENCOUNTER_OTHER) {
@@ -103,9 +103,9 @@ INLINE void encounter_keep_surface(queue q, int at, const encounter *e) {
     }
 }
 
-INLINE encounter queue_met(queue q, int turn, int first) {
+INLINE ray_hit queue_met(queue q, int turn, int first) {
     const int at = turn * q.wave + first;
-    encounter e = encounter_kept(q, at);
+    ray_hit e = ray_hit_kept(q, at);
     const mask sent = less(lanes_load(q.rays + RAY_NEAR * q.stride + at), lanes_load(q.rays + RAY_FAR * q.stride + at));
     mask nearer = sent & ~sent;
     real object = R(0.0);
@@ -118,7 +118,7 @@ INLINE encounter queue_met(queue q, int turn, int first) {
     const mask lands = (sent & mask_of(e.hit)) | nearer;
     real *numbers = (real *)&e;
 #define WRITTEN_NUMBER(i) numbers[i] = pick(i < ENCOUNTER_NORMAL ? sent : lands, numbers[i], R(0.0));
-    WRITTEN_OUT(NUMBERS_OF(encounter), WRITTEN_NUMBER)
+    WRITTEN_OUT(NUMBERS_OF(ray_hit), WRITTEN_NUMBER)
     e.hit = pick(nearer, R(1.0), e.hit);
     e.t = pick(nearer, object, e.t);
     e.touch = pick(nearer, object, e.touch);
@@ -127,7 +127,7 @@ INLINE encounter queue_met(queue q, int turn, int first) {
 }
 
 // The object that a ray has met, or 0.
-INLINE real queue_object(queue q, int turn, int first, encounter met) {
+INLINE real queue_object(queue q, int turn, int first, ray_hit met) {
     if (!q.objects) return R(0.0);
     __global const scalar *at = q.rays + turn * q.wave + first;
     const mask here = mask_of(met.hit) & equal(met.t, lanes_load(at + RAY_OBJECT * q.stride));

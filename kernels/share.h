@@ -25,9 +25,9 @@ INLINE int share_next(share *left, queue q) {
 }
 
 // What a march has found, as the stages after it read it.
-INLINE encounter encounter_of(crossing c) {
+INLINE ray_hit ray_hit_of(crossing c) {
     const vec none = {R(0.0), R(0.0), R(0.0)};
-    return (encounter){number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
+    return (ray_hit){number_of(c.hit), c.steps, c.count, c.t, c.bad, c.touch, c.last, none, R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
 }
 
 // Whether a ray was inside at its first look, although a cone had called the way there free: a distance can be too large for all the
@@ -44,7 +44,7 @@ INLINE int begins_anew(scalar hit, scalar steps, int number, queue q, int goal) 
 // The `idle` lanes put down what they found, and take the next rays, which begin. `places`: the number of each lane's ray, or -1.
 INLINE void lanes_refill(march *m, uint idle, share *left, int *places, queue q, int goal, march_record settings) {
     scalar found[ENCOUNTER_NORMAL * LANES];
-    const encounter now = encounter_of(m->found);
+    const ray_hit now = ray_hit_of(m->found);
 #define HOLD_FOUND(i) lanes_store(((const real *)&now)[i], found + i * LANES);
     WRITTEN_OUT(ENCOUNTER_NORMAL, HOLD_FOUND)
     ray next = m->r;

@@ -46,8 +46,8 @@ INLINE color tint_of(const spot *here, world w) {
 }
 
 // What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut; and the place where it is shaded.
-INLINE encounter surface_met(stage s, int turn, ray r, real *object, vec *place, world w) {
-    const encounter met = queue_met(s.q, turn, s.slot);
+INLINE ray_hit surface_met(stage s, int turn, ray r, real *object, vec *place, world w) {
+    const ray_hit met = queue_met(s.q, turn, s.slot);
     *place = vec_along(r.origin, met.touch, r.direction);
     *object = pick(mask_of(met.hit), met.solid, R(0.0));
     if (!s.q.objects) return met;
@@ -85,7 +85,7 @@ INLINE real lift_of(const spot *here, world w) {
 }
 
 // The spot where one ray has met the surface.
-INLINE spot spot_of_ray(ray r, encounter met, real object, vec place, world w) {
+INLINE spot spot_of_ray(ray r, ray_hit met, real object, vec place, world w) {
     spot here;
     here.found = met.hit;
     here.point = place;
@@ -124,14 +124,14 @@ INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
 }
 
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
-INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *place, world w) {
+INLINE ray_hit met_within(stage s, ray r, ray_hit met, real *object, vec *place, world w) {
     const ray second = queue_ray(s.q, 1, s.slot);
     const mask within = less(second.near, second.far);
     real other_object;
     vec other_place;
-    const encounter other = surface_met(s, 1, r, &other_object, &other_place, w);
+    const ray_hit other = surface_met(s, 1, r, &other_object, &other_place, w);
     *place = vec_pick(within, other_place, *place);
-    for (int i = 0; i < NUMBERS_OF(encounter); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
+    for (int i = 0; i < NUMBERS_OF(ray_hit); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
     *object = pick(within, other_object, *object);
     return met;
 }
@@ -140,7 +140,7 @@ INLINE encounter met_within(stage s, ray r, encounter met, real *object, vec *pl
 INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
 
 // What a march has cost, and where `of_surface` what finding its normal has.
-INLINE void counters_met(counters *cost, encounter met, int of_surface) {
+INLINE void counters_met(counters *cost, ray_hit met, int of_surface) {
     cost->steps += met.steps;
     cost->count += met.count;
     if (!of_surface) return;

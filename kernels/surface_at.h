@@ -19,7 +19,7 @@ INLINE real share_below(vec a, real most, real none) {
 // A wall of a hollow is seen from where no distance is known. It has the gradient and the counts of a place behind it, as far as light is
 // computed before other surfaces, or nearer where the solid ends before. Where the gradient straight behind it is like that on it, it
 // is smooth, and has its own. What is met of anything else keeps what it has.
-INLINE void surface_of_walls(ray r, encounter *met, mask walls, march_record settings,
+INLINE void surface_of_walls(ray r, ray_hit *met, mask walls, march_record settings,
                              orbit_record orbit, constants k, surface_point *surface, vec *normal) {
     const vec on_wall = *normal, hit = vec_along(r.origin, met->t, r.direction);
     real height = (real)(settings->near) * (real)(settings->detail) * (r.footprint + r.spread * met->t);
@@ -43,7 +43,7 @@ INLINE void surface_of_walls(ray r, encounter *met, mask walls, march_record set
 }
 
 // The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
-INLINE surface_point surface_lit(ray r, encounter *met, mask active, march_record settings,
+INLINE surface_point surface_lit(ray r, ray_hit *met, mask active, march_record settings,
                                  orbit_record orbit, constants k, clearance *there, vec *normal) {
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
     surface_point surface, found;
@@ -83,7 +83,7 @@ INLINE surface_point surface_lit(ray r, encounter *met, mask active, march_recor
 #define POLISH_HEIGHT R(0.16667)
 // A place that does not depend on how the march came there: where the distance is a sixth of the cone, by the secant method (the
 // slope is that of a distance, -1, at first). Normals from the positions of points need it.
-INLINE surface_point surface_polished(ray r, encounter *met, mask active, march_record settings,
+INLINE surface_point surface_polished(ray r, ray_hit *met, mask active, march_record settings,
                                       orbit_record orbit, constants k, clearance *there) {
     surface_point surface;
     const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
@@ -112,7 +112,7 @@ INLINE surface_point surface_polished(ray r, encounter *met, mask active, march_
 
 // The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
 // exactly it is may matter.
-INLINE void surface_at(ray r, encounter *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
+INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
     met->touch = fmin(met->touch, met->last);
     clearance there;
     vec normal;
@@ -146,11 +146,11 @@ INLINE void surface_at(ray r, encounter *met, mask active, int polished, march_r
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and where exactly
 // they are, if that matters.
 INLINE void look_at(queue q, int at, march_record settings, orbit_record orbit, constants k) {
-    encounter e = queue_met(q, 0, at);
+    ray_hit e = queue_met(q, 0, at);
     const mask hit = mask_of(e.hit);
     if (!any_lane(hit)) return;
     surface_at(queue_ray(q, 0, at), &e, hit, q.known, settings, orbit, k);
-    encounter_keep_surface(q, at, &e);
+    ray_hit_keep_surface(q, at, &e);
 }
 
 // Looks at the surfaces of a share that was marched. A single lane looks in a kernel of its own, which leaves it more registers for

@@ -48,7 +48,7 @@ INLINE __global scalar *ambient_strength(stage s, int turn) {
 }
 
 // The light that the ray brings from the environment to a surface that scatters the part `diffuse` of it; the ray also counts towards the open part of the hemisphere.
-INLINE color ambient_light(stage s, const spot *here, int turn, encounter met, real diffuse, world w, real *open) {
+INLINE color ambient_light(stage s, const spot *here, int turn, ray_hit met, real diffuse, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
         const mask near = mask_of(met.hit) & less(met.t, (real)(w.settings->occlusion_distance));
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
@@ -114,7 +114,7 @@ INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const spot *he
 INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
                           counters *cost, world w) {
     const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
-    const encounter met = queue_met(s.q, turn, s.slot);
+    const ray_hit met = queue_met(s.q, turn, s.slot);
     counters_met(cost, met, 0);
     color shines;
     mask shadow;
@@ -133,7 +133,7 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, count
     int turn = 0;
     if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
     for (; turn < hemisphere_turns(w); ++turn) {
-        const encounter met = queue_met(s.q, turn, s.slot);
+        const ray_hit met = queue_met(s.q, turn, s.slot);
         counters_met(cost, met, 0);
         gathered = color_add(gathered, ambient_light(s, here, turn, met, surround_of(l), w, &open));
     }
@@ -147,7 +147,7 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, count
         }
         light_record light = w.lights + number / w.settings->light_rays;
         if (number % w.settings->light_rays >= light->rays) continue;
-        const encounter met = queue_met(s.q, turn, s.slot);
+        const ray_hit met = queue_met(s.q, turn, s.slot);
         counters_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
