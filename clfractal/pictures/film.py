@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -98,6 +99,12 @@ class Film:
         self._done = np.zeros(self.grid.count, dtype=np.bool_)
         self.provenance = Provenance(self.grid.count)
         """Which devices made the tiles, if several did."""
+
+    @property
+    def makers(self) -> Provenance:
+        """The former name of `provenance`."""
+        warnings.warn("Film.makers is Film.provenance", DeprecationWarning, stacklevel=2)
+        return self.provenance
 
     @property
     def header(self) -> dict[str, Any]:

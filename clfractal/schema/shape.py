@@ -120,9 +120,10 @@ class Solid(Simple):
     def own_place(self, point: Vector) -> Vector:
         """A point in units of `axes` from its middle."""
         offset = [p - q for p, q in zip(point, self.position, strict=True)]
+        # Divided by lengths: the squares of short axes would be 0.
         x, y, z = (
-            sum(o * a for o, a in zip(offset, axis, strict=True)) / sum(a * a for a in axis)
-            for axis in self.axes
+            sum(o * (a / long) for o, a in zip(offset, axis, strict=True)) / long
+            for axis, long in ((axis, math.hypot(*axis)) for axis in self.axes)
         )
         return (x, y, z)
 

@@ -70,6 +70,12 @@ class AnyEngine(ABC):
         warnings.warn("Engine.look is Engine.preview", DeprecationWarning, stacklevel=2)
         return self.preview
 
+    @property
+    def looks_built_ms(self) -> float:
+        """The former name of `previews_built_ms`."""
+        warnings.warn("Engine.looks_built_ms is Engine.previews_built_ms", DeprecationWarning, stacklevel=2)
+        return self.previews_built_ms
+
     @abstractmethod
     def settled(self, scene: SceneLike) -> Scene:
         """See `Engine.settled`."""

@@ -201,6 +201,13 @@ def test_solids_hold_what_is_inside() -> None:
         np.testing.assert_array_equal(found, expected)
 
 
+@pytest.mark.parametrize("radius", [1e-30, 3.7e-217, 5e-324])
+def test_solids_of_any_size_hold_what_is_inside(radius: float) -> None:
+    solid = SphereObject.checked({"radius": radius})
+    assert not solid.holds((1.0, 0.0, 0.0))
+    assert solid.holds((0.0, 0.0, 0.0))
+
+
 def test_formulas_of_objects_are_written_and_read_again(tmp_path: Path) -> None:
     """Files that they name are read into the scene; their places and scales make the bounds."""
     (tmp_path / "own.yaml").write_text(
