@@ -133,9 +133,7 @@ def promising(device: Device) -> tuple[tuple[int, ...], ...]:
         return (1,), (4,), (8,), (16,)
     if not vectorises_across_work_items(device.info):
         return (16, 8), (4, 1)
-    if device.info.kind == "cpu":
-        return (1, 8, 16), (4,)
-    return (1, 4), (8, 16)
+    return (1, 8, 16), (4,)
 
 
 def is_of_the_device(error: ClfractalError) -> bool:

@@ -116,7 +116,7 @@ def test_a_driver_without_a_cache_gives_binaries(
     monkeypatch.setenv("POCL_KERNEL_CACHE", "0")
     first = build(device, _TRIPLE, flags=_FLAGS, warm=[_WARM], isolated=False)
     binary = compiler.binary_of(first.cl_program)
-    assert len(binary) > 1000
+    assert len(binary) > 500  # NVIDIA's is text for a next compiler
     assert compiler.load_kept(device, binary, "not OpenCL", _FLAGS) is not None
     device.loaded.clear()
     assert _triples(build(device, _TRIPLE, flags=_FLAGS, warm=[_WARM], isolated=False))
