@@ -22,7 +22,8 @@ from typing import Any, Literal
 
 import pyopencl as cl
 
-from clfractal.device.select import Device, Properties, status_name
+from clfractal.device.driver_errors import status_name
+from clfractal.device.select import Device, Properties
 from clfractal.errors import DeviceError
 
 FENCES = "cl_khr_gl_event"

@@ -21,6 +21,7 @@ import pyopencl as cl
 from clfractal.arguments import plain, shown
 from clfractal.device import bundled, cache, drivers_folder
 from clfractal.device.advice import install_hint
+from clfractal.device.driver_errors import error_code, is_out_of_memory
 from clfractal.device.forked import use_opencl
 from clfractal.device.loaded import LoadedPrograms
 from clfractal.device.subdevices import divided, without_parts
@@ -350,34 +351,6 @@ def sees_host_writes(info: DeviceInfo) -> bool:
     so this is only used to ask kernels to end early.
     """
     return info.kind == "cpu" and not is_simulator(info)
-
-
-def is_out_of_memory(error: cl.Error) -> bool:
-    """Whether a failure means that memory is short: drivers use any of four codes for it."""
-    status = cl.status_code
-    return error_number(error) in {
-        status.MEM_OBJECT_ALLOCATION_FAILURE,
-        status.OUT_OF_RESOURCES,
-        status.OUT_OF_HOST_MEMORY,
-        status.INVALID_BUFFER_SIZE,
-    }
-
-
-def error_number(error: cl.Error) -> int:
-    """The OpenCL status code of a failure."""
-    return int(getattr(error, "code", 0))
-
-
-def error_code(error: cl.Error) -> str:
-    """Routine and status of a failure as one short text, e.g. `clEnqueueNDRangeKernel: OUT_OF_RESOURCES`."""
-    routine = getattr(error, "routine", "") or "OpenCL"
-    return f"{routine}: {status_name(error_number(error))}"
-
-
-def status_name(number: int) -> str:
-    """The name of an OpenCL status code, such as `OUT_OF_RESOURCES`."""
-    to_string: Any = cl.status_code.to_string
-    return str(to_string(number, "status %d"))
 
 
 def _found() -> list[Device]:
