@@ -1,7 +1,7 @@
 // Which points belong to the solid that the search for a surface looks for. One work-item takes LANES points in a row.
 #include "lanes.h"
 #include "numbers/real.h"
-#include "numbers/dual.h"
+#include "numbers/powers.h"
 #include "vectors.h"
 #include "structs.h"
 #include "formula.h"

@@ -50,7 +50,7 @@ __kernel void normals(__global const scalar *points, __global scalar *results, i
     __global scalar *to = results + lane;
     mask usable;
     real residual;
-    vec normal = plane_normal(sums, &residual, &usable);
+    vec normal = normal_of_plane(sums, &residual, &usable);
     store_normal(to, pixels, normal, usable);
     normal = triangle_normal(compass, found, &usable);
     store_normal(to + 4 * pixels, pixels, normal, usable);

@@ -18,7 +18,7 @@ from clfractal.viewer.panels.ui import Ui
 
 # No name that a material may have.
 PHONG, NEW = "", " "
-_IN_A_ROW = 4
+_IN_A_ROW = 3
 _GRIDS, _MOST_FILES = (".nrrd", ".nhdr", ".npy"), 50
 _KINDS: dict[str, str] = {kind.tag: kind.title for kind in KINDS}
 _ABOUT = {
