@@ -142,7 +142,7 @@ def test_all_that_is_dragged_is_accepted_and_undone(scene: str) -> None:
     before, watched = ui.studio.scene, _Watched(ui)
     stage = Stage(ui, scene_dock.draw, window=False)
     random = np.random.default_rng(11)
-    for _ in range(120):
+    for _ in range(150):
         x, y = float(random.uniform(130, 290)), float(random.uniform(50, 2600))
         stage.drag(
             (x, y), (x + float(random.uniform(-150, 150)), y + float(random.uniform(-10, 10))), steps=3
