@@ -46,19 +46,6 @@ T = TypeVar("T")
 # In a validator's context: sections are replaced one by one, and cameras get their places when all have been.
 _PART = "part"
 
-# In a validator's context: sections are replaced one by one, and cameras get their places when all have been.
-_PART = "part"
-
-# Data that a scene has read or resolved, and the section that they depend on.
-_SECTIONS = {
-    "chain": "formula",
-    "joined_chains": "objects",
-    "surroundings": "environment",
-    "given": "renderer",
-    "grids": "objects",
-    "textures": "materials",
-}
-
 
 class Scene(Section):
     """A picture to be made: a formula, a camera, a renderer and everything else that determines the pixels."""
