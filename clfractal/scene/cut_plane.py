@@ -4,13 +4,13 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.scene.coloring import Palette, check_order
 from clfractal.scene.objects import MAX_OBJECTS
 from clfractal.scene.plane import Plane
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.schema.fields import WHOLE, Usual
 from clfractal.schema.names import ObjectName
+from clfractal.schema.stops import Palette, check_order
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 

@@ -4,8 +4,8 @@ from typing import Literal
 
 from pydantic import Field
 
-from clfractal.scene.coloring import Trap
 from clfractal.schema.base import Amount, Color, Length, Section
+from clfractal.schema.trap import Trap
 
 
 class Glow(Section):

@@ -4,9 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.coloring import Palette, Trap, check_order
-from clfractal.scene.surface import Ball
-from clfractal.scene.temperature import black_body
+from clfractal.schema.ball import Ball
 from clfractal.schema.base import (
     Amount,
     Color,
@@ -25,6 +23,9 @@ from clfractal.schema.base import (
     unit,
 )
 from clfractal.schema.fields import Usual
+from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.temperature import black_body
+from clfractal.schema.trap import Trap
 
 MAX_LIGHTS = 64
 MAX_PLACES = 20_000

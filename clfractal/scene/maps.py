@@ -6,7 +6,6 @@ from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.fields import FieldInfo
 
-from clfractal.scene.coloring import Palette, Trap, check_order
 from clfractal.schema.base import (
     Amount,
     Coordinate,
@@ -21,6 +20,8 @@ from clfractal.schema.base import (
     problem,
 )
 from clfractal.schema.fields import Usual
+from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.trap import Trap
 
 QUANTITIES = (
     "iterations",

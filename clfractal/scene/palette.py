@@ -16,7 +16,8 @@ from clfractal.scene.palettes import PALETTES, table
 if TYPE_CHECKING:
     from cmap import Colormap
 
-    from clfractal.scene.coloring import Coloring, Stop
+    from clfractal.scene.coloring import Coloring
+    from clfractal.schema.stops import Stop
 
 SIZE = 256
 

@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 from clfractal.errors import SceneError, Where
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.language import Chain
-from clfractal.scene.coloring import Trap
 from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.schema.base import unit
+from clfractal.schema.trap import Trap
 
 Floats = NDArray[np.float64]
 

@@ -6,19 +6,13 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.scene.sampled import Sampled
-from clfractal.schema.base import Length, Position, Section, problem
-from clfractal.schema.fields import SCALE, Usual
+from clfractal.schema.ball import Ball
+from clfractal.schema.base import Length, Section, problem
+from clfractal.schema.fields import Usual
 
 # Normals that need a middle point and its eight neighbours, so a grid with an odd side.
 GRID_NORMALS = ("one_triangle", "eight_triangles_shading", "eight_triangles_normal")
 MAX_POINTS = 64
-
-
-class Ball(Section):
-    """A ball in space that contains everything visible."""
-
-    center: Position = Field((0.0, 0.0, 0.0), description="scene units")
-    radius: Annotated[Length, SCALE] = Field(description="scene units")
 
 
 class Points(Section):

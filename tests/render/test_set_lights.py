@@ -13,8 +13,8 @@ from clfractal.formulas import reference
 from clfractal.renderers.kinds import TRAPS
 from clfractal.renderers.set_lights import BALL_NUMBERS, SetLights, packed, probabilities, set_lights_of
 from clfractal.scene import places
-from clfractal.scene.coloring import Trap
 from clfractal.scene.model import Scene
+from clfractal.schema.trap import Trap
 from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, shoot, stacked
 from tests.render.traps import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
 from tests.scenes import scene_of

@@ -4,7 +4,7 @@ import pytest
 
 from clfractal.errors import SceneError
 from clfractal.scene.lighting import PointLight, RectangleLight
-from clfractal.scene.temperature import black_body, chromaticity
+from clfractal.schema.temperature import black_body, chromaticity
 
 
 # Points of the Planckian locus (CIE 1931, 2 degrees); illuminant A is the one of 2856 K.

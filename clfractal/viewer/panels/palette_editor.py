@@ -13,9 +13,9 @@ from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError
 from clfractal.files.srgb import encode
-from clfractal.scene.coloring import Stop
 from clfractal.scene.palette import named_table, names
 from clfractal.scene.palettes import PALETTES
+from clfractal.schema.stops import Stop
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import area
