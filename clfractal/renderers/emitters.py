@@ -5,10 +5,10 @@ from __future__ import annotations
 from clfractal.renderers.maps import glass_bodies
 from clfractal.renderers.materials import used_materials
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.maps import Map
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Vector
+from clfractal.schema.mapped import Map
 from clfractal.schema.shape import Solid
 
 

@@ -14,11 +14,11 @@ from clfractal.files.srgb import encode
 from clfractal.renderers.materials import PBR, material_values, parameter_numbers, used_materials
 from clfractal.scene.blends import Blends, blends_of, is_glass, is_participating, is_subsurface
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.maps import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
 from clfractal.schema.base import unit
+from clfractal.schema.mapped import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
 
 MAP = Struct(
     "Map",

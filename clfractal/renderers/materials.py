@@ -12,10 +12,10 @@ from clfractal.renderers.scattering import (
     SMOOTHEST_FUZZ_PARTS,
     SMOOTHEST_PARTS,
 )
-from clfractal.scene.maps import Map
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
+from clfractal.schema.mapped import Map
 
 PBR = Struct(
     "Pbr",

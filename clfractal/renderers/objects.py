@@ -15,12 +15,12 @@ from clfractal.renderers.materials import used_materials
 from clfractal.renderers.object_grids import NO_GRID, ObjectGrids, grid_defines
 from clfractal.renderers.water import WAVES, wave_set
 from clfractal.scene.blends import is_glass
-from clfractal.scene.maps import Map
 from clfractal.scene.materials import WHITE, PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
 from clfractal.schema.base import Vector, frame_of, length
+from clfractal.schema.mapped import Map
 from clfractal.schema.shape import AXES, Level, ObjectBase, Simple, Solid
 
 _OTHER_KINDS = {"water": 0, "joined": -1, "volume": -2, "cloud": -3}

@@ -30,10 +30,10 @@ from clfractal.scene.lighting import (
     SphereLight,
     SpotLight,
 )
-from clfractal.scene.maps import QUANTITIES, Map
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient, Image
 from clfractal.schema.base import unit
+from clfractal.schema.mapped import QUANTITIES, Map
 
 VIEW = Struct(
     "View",

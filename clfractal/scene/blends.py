@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.maps import Map
 from clfractal.scene.materials import BLACK, PbrMaterial
+from clfractal.schema.mapped import Map
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,10 +26,10 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
 from clfractal.scene.lighting import SetLight
-from clfractal.scene.maps import ColorMap, maps_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
 from clfractal.scene.parts import MAX_SIDE, Image
+from clfractal.schema.mapped import ColorMap, maps_of
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,9 +4,9 @@ from typing import Annotated, Self
 
 from pydantic import Field, Tag, model_validator
 
-from clfractal.scene.maps import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
 from clfractal.schema.base import Color, Coordinate, Length, problem
 from clfractal.schema.fields import Usual
+from clfractal.schema.mapped import FORM, AmountMap, ColorMap, FractionMap, Mapped, NumberMap, ReflectanceMap
 from clfractal.schema.names import MaterialName
 
 Ior = Annotated[float, Field(strict=True, ge=1, le=10, allow_inf_nan=False)]

@@ -6,11 +6,11 @@ from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
-from clfractal.scene.maps import maps_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.mapped import maps_of
 from clfractal.schema.shape import Level, Solid
 
 

@@ -15,8 +15,8 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.files.inputs import note
-from clfractal.scene.maps import maps_of
 from clfractal.scene.materials import PbrMaterial
+from clfractal.schema.mapped import maps_of
 
 Floats = npt.NDArray[np.float32]
 

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 pytest.importorskip("imgui_bundle")
 
-from clfractal.scene.maps import NumberMap
+from clfractal.schema.mapped import NumberMap
 from clfractal.viewer.panels import maps, scene_dock
 from clfractal.viewer.panels.ui import Ui
 from tests.viewer.panel_harness import Stage, make_ui

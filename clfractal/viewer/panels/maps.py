@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from imgui_bundle import imgui
 
-from clfractal.scene.maps import ColorMap, Map, NumberMap
+from clfractal.schema.mapped import ColorMap, Map, NumberMap
 from clfractal.viewer.panels import palette_editor, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui

@@ -11,10 +11,10 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticUndefined
 
-from clfractal.scene.maps import Map
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 from clfractal.schema.fields import Usual, known
+from clfractal.schema.mapped import Map
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
 

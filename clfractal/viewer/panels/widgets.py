@@ -11,7 +11,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.maps import Map
+from clfractal.schema.mapped import Map
 from clfractal.viewer.panels import metadata, theme
 from clfractal.viewer.panels.buttons import button, choose, icon_button, segments, text_box, tip, toggle
 from clfractal.viewer.panels.color_button import color_button
