@@ -14,12 +14,12 @@ import statistics
 import threading
 import time
 
-from clfractal.commands.bench import HAST
+from clfractal.cli.bench import HAST
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.engine import Engine
 from clfractal.errors import Stopped
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 
 
 def cancelled_after(engine: Engine, scene: Scene, delay: float) -> float | None:

@@ -29,10 +29,10 @@ import psutil
 
 import clfractal
 from clfractal.cluster.cluster import Cluster
-from clfractal.pictures.tiles import TILE
-from clfractal.work.engine import Engine
-from clfractal.work.films import JobFilms
-from clfractal.work.run import run
+from clfractal.engine.engine import Engine
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.run import run
+from clfractal.images.tiles import TILE
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 60}
@@ -217,7 +217,7 @@ async def simulate(count: int, seconds: float, address: str) -> None:
     from clfractal.cluster import tasks as real
     from clfractal.cluster.fingerprint import fingerprint
     from clfractal.device.select import choose
-    from clfractal.work.run import Counters
+    from clfractal.engine.run import Counters
 
     info = choose(None).info
 

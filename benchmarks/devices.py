@@ -16,11 +16,11 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from clfractal.commands.bench import HAST, MANDELBULB
+from clfractal.cli.bench import HAST, MANDELBULB
 from clfractal.device.select import choose
+from clfractal.engine.engine import Engine
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 
 ROUNDS = 9
 SCENES = {"mandelbulb8-shadow": MANDELBULB, "hast2-shadow": HAST}

@@ -15,14 +15,14 @@ import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from clfractal.commands import bench
-from clfractal.renderers.volume import settings_of
+from clfractal.cli import bench
+from clfractal.engine.engine import Engine
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.run import run
+from clfractal.integrators.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.fill import fill_grid
-from clfractal.work.engine import Engine
-from clfractal.work.films import JobFilms
-from clfractal.work.run import run
 
 RESOLUTIONS = (128, 256, 512, 1024)
 SHOWN = (256, 512, 1024)

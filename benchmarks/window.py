@@ -248,8 +248,8 @@ def opened(scene: str | Path, overrides: Sequence[str], size: tuple[int, int], d
     """The window, in this process. What crashes of the user's windows have left is neither offered nor touched."""
     from clfractal.viewer import autosave
     from clfractal.viewer.begin import begin
-    from clfractal.viewer.options import Options
     from clfractal.viewer.settings import Settings
+    from clfractal.viewer.window_options import Options
 
     os.environ.setdefault("PYOPENGL_USE_ACCELERATE", "0")
     sys.setswitchinterval(0.0002)
@@ -330,7 +330,7 @@ def main() -> None:
     if unknown:
         parser.error(f"unknown scene {unknown[0]!r}; there are {', '.join(SCENES)}")
     server = None if os.environ.get("DISPLAY") else start_xvfb()
-    from clfractal import resources
+    from clfractal.files import resources
 
     rows = []
     try:

@@ -25,6 +25,11 @@ if TYPE_CHECKING:
     from clfractal.cluster.cluster import Cluster as Cluster
     from clfractal.device.cancel import CancelToken as CancelToken
     from clfractal.device.select import devices as devices
+    from clfractal.engine.engine import Engine as Engine
+    from clfractal.engine.frames import at_frame as at_frame
+    from clfractal.engine.frames import frames as frames
+    from clfractal.engine.run import Progress as Progress
+    from clfractal.engine.variations import variations as variations
     from clfractal.errors import ClfractalError as ClfractalError
     from clfractal.errors import DeviceError as DeviceError
     from clfractal.errors import FileError as FileError
@@ -33,18 +38,13 @@ if TYPE_CHECKING:
     from clfractal.errors import SceneError as SceneError
     from clfractal.errors import Stopped as Stopped
     from clfractal.files.mesh import Mesh as Mesh
-    from clfractal.files.volume import Volume as Volume
-    from clfractal.pictures.film import Film as Film
-    from clfractal.pictures.probe import Probe as Probe
-    from clfractal.renderers.points import Distances as Distances
-    from clfractal.resources import __version__ as __version__
+    from clfractal.files.resources import __version__ as __version__
+    from clfractal.files.volume_file import Volume as Volume
+    from clfractal.images.film import Film as Film
+    from clfractal.images.probe import Probe as Probe
+    from clfractal.integrators.points import Distances as Distances
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
-    from clfractal.work.engine import Engine as Engine
-    from clfractal.work.frames import at_frame as at_frame
-    from clfractal.work.frames import frames as frames
-    from clfractal.work.run import Progress as Progress
-    from clfractal.work.variations import variations as variations
 
 _HOMES = {
     "distances": "clfractal.api",
@@ -66,18 +66,18 @@ _HOMES = {
     "SceneError": "clfractal.errors",
     "Stopped": "clfractal.errors",
     "Mesh": "clfractal.files.mesh",
-    "Volume": "clfractal.files.volume",
-    "Film": "clfractal.pictures.film",
-    "Probe": "clfractal.pictures.probe",
-    "Distances": "clfractal.renderers.points",
-    "__version__": "clfractal.resources",
+    "Volume": "clfractal.files.volume_file",
+    "Film": "clfractal.images.film",
+    "Probe": "clfractal.images.probe",
+    "Distances": "clfractal.integrators.points",
+    "__version__": "clfractal.files.resources",
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
-    "Engine": "clfractal.work.engine",
-    "at_frame": "clfractal.work.frames",
-    "frames": "clfractal.work.frames",
-    "Progress": "clfractal.work.run",
-    "variations": "clfractal.work.variations",
+    "Engine": "clfractal.engine.engine",
+    "at_frame": "clfractal.engine.frames",
+    "frames": "clfractal.engine.frames",
+    "Progress": "clfractal.engine.run",
+    "variations": "clfractal.engine.variations",
 }
 
 __all__ = [*_HOMES]

@@ -10,8 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeAlias, cast
 import numpy as np
 import numpy.typing as npt
 
-from clfractal import arguments
-from clfractal.errors import FormulaError, Where
+from clfractal.errors import FormulaError, Where, arguments
 from clfractal.scene.load import as_scene
 from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene
@@ -19,16 +18,16 @@ from clfractal.scene.model import Scene
 if TYPE_CHECKING:
     from clfractal.device.select import Device
     from clfractal.device.structs import Precision
+    from clfractal.engine.any_engine import Elsewhere
+    from clfractal.engine.grids import Talk
+    from clfractal.engine.run import ProgressCallback
     from clfractal.files.mesh import Mesh
-    from clfractal.files.volume import Volume
+    from clfractal.files.volume_file import Volume
     from clfractal.formulas.language import Chain
-    from clfractal.pictures.film import Film
-    from clfractal.pictures.probe import Probe
-    from clfractal.renderers.points import Distances
+    from clfractal.images.film import Film
+    from clfractal.images.probe import Probe
+    from clfractal.integrators.points import Distances
     from clfractal.scene.coloring import Coloring
-    from clfractal.work.any_engine import Elsewhere
-    from clfractal.work.grids import Talk
-    from clfractal.work.run import ProgressCallback
 
 __all__ = ["distances", "escape", "load_scene", "mesh", "probe", "render", "render_pair", "voxelize"]
 
@@ -77,7 +76,7 @@ def render(
         DeviceError: no device, an unknown one, too little memory on it, or it failed.
         KernelBuildError: the generated program does not compile.
     """
-    from clfractal.work.engine import engine_on
+    from clfractal.engine.engine import engine_on
 
     with engine_on(device, executor) as engine:
         return engine.render(
@@ -111,7 +110,7 @@ def render_pair(
     Returns:
         The films of the left and the right eye, of the size of `image` (half of it in the squeezed modes).
     """
-    from clfractal.work.engine import engine_on
+    from clfractal.engine.engine import engine_on
 
     with engine_on(device, executor) as engine:
         return engine.render_pair(
@@ -148,7 +147,7 @@ def probe(
         SceneError, FormulaError: the scene is wrong, or the pixel is not in its picture.
         DeviceError, KernelBuildError: as for `render`.
     """
-    from clfractal.work.engine import Engine
+    from clfractal.engine.engine import Engine
 
     with Engine(device) as engine:
         return engine.probe(scene, x, y, precision=precision)
@@ -186,7 +185,7 @@ def escape(
         DeviceError, KernelBuildError: as for `render`.
     """
     from clfractal.device.orbit import MOST_APPLICATIONS
-    from clfractal.renderers import points as launch
+    from clfractal.integrators import points as launch
 
     asked = _asked(formula, parameters, points, iterations, MOST_APPLICATIONS, precision)
     if bailout is not None:
@@ -230,7 +229,7 @@ def distances(
         FileError: the formula's file cannot be read.
         DeviceError, KernelBuildError: as for `render`.
     """
-    from clfractal.renderers import points as launch
+    from clfractal.integrators import points as launch
     from clfractal.scene.formula import MOST_ITERATIONS
 
     asked = _asked(formula, parameters, points, iterations, MOST_ITERATIONS, precision, least=1)
@@ -266,7 +265,7 @@ def voxelize(
         SceneError, FormulaError: the scene or an argument is wrong, or the grid does not fit into memory.
         DeviceError, KernelBuildError: as for `render`.
     """
-    from clfractal.work import grids
+    from clfractal.engine import grids
 
     arguments.function("progress", progress)
     wanted, coloring = _volume_scene(scene, resolution, precision)
@@ -305,8 +304,8 @@ def mesh(
         FileError: scikit-image is not installed.
         DeviceError, KernelBuildError: as for `render`.
     """
-    from clfractal.files.volume import Volume
-    from clfractal.work import grids, meshes
+    from clfractal.engine import grids, meshes
+    from clfractal.files.volume_file import Volume
 
     meshes.check_library()
     arguments.function("progress", progress)
@@ -332,7 +331,7 @@ def _volume_scene(
     source: SceneLike, resolution: int | Sequence[int] | None, precision: str | None
 ) -> tuple[Scene, Coloring]:
     """The scene that a grid is made of, with arguments in it, and the coloring of its mesh."""
-    from clfractal.work import grids
+    from clfractal.engine import grids
 
     scene, coloring = grids.as_volume(as_scene(source))
     changes: dict[str, Any] = {}
@@ -346,7 +345,7 @@ def _volume_scene(
 
 
 def _talk(progress: Callable[[str, float], None] | None) -> Talk:
-    from clfractal.work.grids import Talk
+    from clfractal.engine.grids import Talk
 
     return Talk() if progress is None else Talk(progress=progress)
 
@@ -368,7 +367,7 @@ class _Asked:
             DeviceError: there is none.
         """
         from clfractal.device.select import choose, has_float64
-        from clfractal.renderers.lanes import best_lanes, rule_of
+        from clfractal.integrators.lanes import best_lanes, rule_of
 
         chosen = choose(device)
         if self.precision == "float64" and not has_float64(chosen.info):

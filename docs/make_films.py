@@ -19,11 +19,11 @@ import numpy as np
 from make_gallery import Floats, best_below, reduced, shown_light
 from PIL import Image
 
-from clfractal import resources
 from clfractal.api import load_scene
+from clfractal.engine.frames import frames
+from clfractal.files import resources
 from clfractal.files.srgb import encode8
 from clfractal.scene.model import Scene
-from clfractal.work.frames import frames
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"

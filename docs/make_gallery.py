@@ -21,13 +21,13 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from clfractal import resources
 from clfractal.api import load_scene, render
+from clfractal.files import resources
 from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
-from clfractal.pictures.compose import APART
-from clfractal.pictures.develop import Development, developed
-from clfractal.pictures.film import Film
+from clfractal.images.compose import APART
+from clfractal.images.develop import Development, developed
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent

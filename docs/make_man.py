@@ -14,7 +14,7 @@ from typing import Any
 import typer
 
 import clfractal
-from clfractal.commands.app import app
+from clfractal.cli.program import app
 
 DOCS = Path(__file__).resolve().parent
 FILE = DOCS / "clfractal.1"

@@ -21,8 +21,8 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from clfractal import resources
 from clfractal.api import load_scene, render
+from clfractal.files import resources
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent

@@ -42,8 +42,8 @@ from PIL import Image
 
 from clfractal.api import load_scene, render
 from clfractal.files.srgb import encode8
-from clfractal.pictures.anaglyph import IDEAL
-from clfractal.pictures.outputs import png_bytes
+from clfractal.images.anaglyph import IDEAL
+from clfractal.images.outputs import png_bytes
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES
 from clfractal.scene.palettes import table as table_of

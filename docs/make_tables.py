@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from clfractal.renderers.glass import found_glass
-from clfractal.renderers.scattering import found_albedos
+from clfractal.shading.glass import found_glass
+from clfractal.shading.scattering import found_albedos
 
 TABLES = Path(__file__).resolve().parents[1] / "clfractal" / "tables"
 

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from clfractal.pictures.anaglyph import IDEAL, LUMINANCE, Filter, Floats, Glasses
+from clfractal.images.anaglyph import IDEAL, LUMINANCE, Filter, Floats, Glasses
 
 REAL_RED_CYAN: tuple[Filter, Filter] = ((0.381, 0.030, 0.010), (0.063, 0.379, 0.554))
 """A real pair: luminance of each primary of a cathode ray tube behind the filter, in its luminance without it.

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clfractal.commands import render
-from clfractal.commands.progress import Reporter
-from clfractal.commands.shell import Shell
+from clfractal.cli import render
+from clfractal.cli.progress import Reporter
+from clfractal.cli.shell import Shell
+from clfractal.engine import drawing
+from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
-from clfractal.work import drawing
-from clfractal.work.run import Progress
 
 
 def watched(monkeypatch: pytest.MonkeyPatch, stop_at: int | None = None) -> list[tuple[int, int, int]]:

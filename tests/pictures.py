@@ -17,10 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from clfractal import resources
 from clfractal.api import load_scene, render, render_pair
-from clfractal.pictures.compose import APART, Composed
-from clfractal.pictures.film import Film
+from clfractal.files import resources
+from clfractal.images.compose import APART, Composed
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer

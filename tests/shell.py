@@ -13,7 +13,7 @@ import pytest
 
 import clfractal
 from clfractal.cli import run
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 8}

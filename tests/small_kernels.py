@@ -28,7 +28,7 @@ INLINE void store(__global scalar *to, real value) {
     for (int lane = 0; lane < LANES; ++lane) to[lane] = each[lane];
 }
 """
-"""What kernels read and write their packets by, behind "numbers/real.h" or "vectors.h"."""
+"""What kernels read and write their packets by, behind "formulas/numbers/real.h" or "device/vectors.h"."""
 
 
 class SmallKernels:

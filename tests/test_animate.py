@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.film_parts import Part
+from clfractal.cli.film_parts import Part
+from clfractal.engine import run as work
 from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
 from clfractal.files.frame_names import frame_file
-from clfractal.work import run as work
 from tests.shell import InProcess, command, environment
 
 SCENE = """version: 1
@@ -94,7 +94,7 @@ def test_interrupted_the_finished_frames_stay(clf: InProcess, monkeypatch: pytes
         return render(*arguments, **settings)
 
     with monkeypatch.context() as patch:
-        patch.setattr("clfractal.commands.numbered.run", interrupted)
+        patch.setattr("clfractal.cli.numbered.run", interrupted)
         with pytest.raises(KeyboardInterrupt):
             clf("animate", "scene.yaml", "-o", "f#.png")
     assert names() == ["f0.png", "f1.png"]
@@ -133,7 +133,7 @@ def test_a_frame_in_work_keeps_its_tiles(clf: InProcess, monkeypatch: pytest.Mon
         return render(job, stores, *arguments, **{**settings, "progress": stop})
 
     with monkeypatch.context() as patch:
-        patch.setattr("clfractal.commands.numbered.run", interrupted)
+        patch.setattr("clfractal.cli.numbered.run", interrupted)
         with pytest.raises(KeyboardInterrupt):
             clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64")
     assert names() == ["f1.exr.partial"]

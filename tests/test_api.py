@@ -15,8 +15,8 @@ import pytest
 from PIL import Image
 
 import clfractal
+from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
-from clfractal.work.run import Progress
 from tests.shell import SCENE, environment
 
 

@@ -12,7 +12,7 @@ import pytest
 
 import clfractal
 from clfractal import camera
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from tests.shell import SCENE
 
 POINTS = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]]
@@ -168,7 +168,7 @@ def test_a_copy_of_a_section_is_checked() -> None:
     refused(lambda: scene.image.model_copy(update={"width": 0}), "width: must be at least 1, got 0")
     plane = clfractal.load_scene(SCENE + "renderer: {type: cut_plane}\n").renderer
     from clfractal.scene.cut_plane import CutPlaneRenderer
-    from clfractal.scene.plane import moved
+    from clfractal.scene.rectangle import moved
 
     assert isinstance(plane, CutPlaneRenderer)
     refused(lambda: moved(plane.plane, normal=1e9), "center", clfractal.SceneError)

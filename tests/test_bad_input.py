@@ -11,10 +11,10 @@ from pathlib import Path
 
 import pytest
 
-from clfractal.commands import progress
+from clfractal.cli import progress
 from clfractal.device import drivers_folder, program, select
-from clfractal.renderers import surface
-from clfractal.renderers.kernel import ProgramText
+from clfractal.integrators import surface
+from clfractal.integrators.kernel import ProgramText
 from tests.files.limits import file_size_limit
 from tests.shell import SCENE, InProcess, command, environment
 

@@ -16,15 +16,15 @@ from benchmarks.rivals.base import MissingError
 from benchmarks.rivals.mandelbulber import Mandelbulber
 from benchmarks.rivals.vtk_volume import VtkVolume
 from benchmarks.runtimes import Runtime
-from clfractal.commands import bench
-from clfractal.commands.shell import Shell
+from clfractal.cli import bench
+from clfractal.cli.shell import Shell
 from clfractal.device.select import choose
+from clfractal.engine.engine import Engine
 from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.work.engine import Engine
 
 
 def scene_of(row: str, *changes: str) -> Scene:
@@ -138,7 +138,7 @@ def test_only_the_wanted_rows_are_measured(tmp_path: Path, monkeypatch: pytest.M
     monkeypatch.setattr(bench, "_render_row", row)
     monkeypatch.setattr(bench, "_grid_row", lambda device: row(bench.GRID_ROW))
     monkeypatch.setattr(bench, "_shell_row", lambda device: row(bench.SHELL_ROW))
-    monkeypatch.setattr("clfractal.commands.frames.frame_times", lambda name, device: (1.0, 2.0))
+    monkeypatch.setattr("clfractal.cli.bench_frames.frame_times", lambda name, device: (1.0, 2.0))
     monkeypatch.setattr(bench, "fma_peak", lambda device, precision: 100.0)
     report = tmp_path / "bench.json"
     shell = Shell(owns_process=False)

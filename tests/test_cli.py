@@ -16,14 +16,14 @@ import pytest
 import typer
 
 import clfractal
-from clfractal.commands import progress
-from clfractal.commands.app import app
-from clfractal.commands.progress import Reporter
-from clfractal.commands.shell import Shell
+from clfractal.cli import progress
+from clfractal.cli.program import app
+from clfractal.cli.progress import Reporter
+from clfractal.cli.shell import Shell
+from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import catalog
-from clfractal.work.run import Progress
 from tests.shell import SCENE, InProcess, command, environment, process
 
 

@@ -9,24 +9,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from clfractal.camera.views import scene_view, seen_by
 from clfractal.device.select import Device, choose
-from clfractal.optics.stereo import degrees, eye_distance
-from clfractal.optics.view import scene_view, seen_by
+from clfractal.engine import comfort
+from clfractal.engine import preview as preview_module
+from clfractal.engine.comfort import Comfort, comfort_of, comfort_of_depth, fitted, measured
+from clfractal.engine.job import Job
+from clfractal.engine.preview import Preview, points_of_depth
+from clfractal.engine.run import run
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName, Stereo
-from clfractal.work import comfort
-from clfractal.work import preview as preview_module
-from clfractal.work.comfort import (
-    Comfort,
-    comfort_of,
-    comfort_of_depth,
-    fitted,
-    measured,
-)
-from clfractal.work.job import Job
-from clfractal.work.preview import Preview, points_of_depth
-from clfractal.work.run import run
+from clfractal.stereo.eyes import degrees, eye_distance
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, shoot
 from tests.scenes import scene_of
 from tests.shell import SCENE

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from clfractal.commands.app import app
+from clfractal.cli.program import app
 from clfractal.formulas import catalog
 from tests.makers import DOCS, maker
 from tests.shell import InProcess, command, environment, process

@@ -14,10 +14,10 @@ from typing import Any
 import pytest
 
 from clfractal.device.select import choose
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import Result
 from clfractal.errors import DeviceError
 from clfractal.files.exr import read_exr
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import Result
 from tests.halves import halves_of
 from tests.interrupts import planes
 from tests.long_renders import ENDLESS, HEAVY, LIMIT_SECONDS, PROMISE_SECONDS, TILES, interrupt

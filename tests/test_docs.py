@@ -19,8 +19,8 @@ from pathlib import Path
 import pytest
 
 import clfractal
+from clfractal.files.resources import folder
 from clfractal.formulas import catalog
-from clfractal.resources import folder
 from tests.makers import PICTURES
 from tests.shell import environment
 

@@ -20,17 +20,18 @@ import typer
 
 import clfractal
 from clfractal import api, errors
-from clfractal.commands.app import app
+from clfractal.cli.program import app
 from clfractal.device import cache, select
+from clfractal.engine import frames
 from clfractal.files import document, regular
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.formulas import binding, build, catalog, chain, evaluate, model, nodes, own, parser, turns
-from clfractal.renderers import lanes
+from clfractal.formulas import binding, build, catalog, chain, evaluate, nodes, own, parser, turns
+from clfractal.formulas import definition as model
+from clfractal.integrators import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.viewer import settings
-from clfractal.work import frames
 from tests.document import DOCS, PAGES, code, section, table, text
 from tests.makers import maker
 from tests.shell import SCENE, InProcess
@@ -197,7 +198,7 @@ def test_messages(
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a.exr, a.png and stats.json."""
     from clfractal.cli import run
-    from clfractal.commands.shell import Shell
+    from clfractal.cli.shell import Shell
 
     folder = tmp_path_factory.mktemp("rendered")
     (folder / "scene.yaml").write_text(SCENE)
@@ -253,7 +254,7 @@ def test_the_python_api_is_described() -> None:
 
 @pytest.mark.parametrize("page", PAGES)
 def test_files_that_a_page_names_exist(page: str) -> None:
-    """`clfractal/optics/view.py`, `kernels/march.h`: a page for engineers outlives its files only too easily."""
+    """`clfractal/camera/views.py`, `march.h`: a page for engineers outlives its files only too easily."""
     named = set(re.findall(r"`((?:clfractal|kernels|tests|benchmarks|scenes)/[\w./]+\.\w+)`", text(page)))
     assert [name for name in sorted(named) if not os.path.exists(DOCS.parent / name)] == []
 

@@ -12,20 +12,12 @@ import pytest
 from PIL import Image
 
 from clfractal.api import load_scene
-from clfractal.optics.stereo import degrees
-from clfractal.pictures.anaglyph import (
-    IDEAL,
-    Filter,
-    Floats,
-    Glasses,
-    Method,
-    matrices,
-    mix,
-)
-from clfractal.pictures.modes import eye_size, picture_size
-from clfractal.pictures.outputs import output_files
+from clfractal.images.anaglyph import IDEAL, Filter, Floats, Glasses, Method, matrices, mix
+from clfractal.images.modes import eye_size, picture_size
+from clfractal.images.outputs import output_files
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
+from clfractal.stereo.eyes import degrees
 from tests.document import DOCS, code, table, text
 from tests.ghosting import REAL_RED_CYAN, ghosting, leaking
 from tests.makers import maker, pictured

@@ -16,10 +16,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from clfractal.commands import voxelize as voxelize_command
+from clfractal.cli import voxelize as voxelize_command
 from clfractal.files.srgb import encode
-from clfractal.files.volume import SCENE_KEY, Volume, read_volume, write_volume
-from clfractal.renderers.vertices import on_faces
+from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_volume
+from clfractal.integrators.vertices import on_faces
 from clfractal.scene import given
 from clfractal.scene import load as load_module
 from clfractal.scene.load import load_scene
@@ -373,7 +373,7 @@ def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
 
 def test_meshes_need_no_opencl_until_the_input_is_right() -> None:
     code = (
-        "import sys; from clfractal.cli import run; from clfractal.commands.shell import Shell\n"
+        "import sys; from clfractal.cli import run; from clfractal.cli.shell import Shell\n"
         "assert run(['mesh', 'missing.yaml', '-o', 'm.ply'], Shell(owns_process=False)) == 2\n"
         "print([m for m in ('pyopencl', 'skimage', 'trimesh', 'OpenEXR') if m in sys.modules])"
     )

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import clfractal
-from clfractal.commands.film_parts import Part, ranges, shown_ranges
-from clfractal.commands.film_sheet import MOST_FRAMES, spread
+from clfractal.cli.film_parts import Part, ranges, shown_ranges
+from clfractal.cli.film_sheet import MOST_FRAMES, spread
 from clfractal.files.whole import is_whole
 from tests.shell import InProcess
 

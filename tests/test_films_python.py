@@ -14,7 +14,7 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from tests.shell import SCENE, InProcess
 
 PAIR = SCENE + "stereo: {screen_width: 0.6, screen_distance: 0.7}\n"

@@ -14,8 +14,8 @@ from clfractal.files.atomic import PICTURES
 from clfractal.files.exr import read_exr
 from clfractal.files.photo import read_texts
 from clfractal.files.png import read_texts as read_png_texts
-from clfractal.pictures.formats import KINDS
-from clfractal.pictures.modes import PICKED
+from clfractal.images.formats import KINDS
+from clfractal.images.modes import PICKED
 from tests.shell import SCENE, Ended, InProcess
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from clfractal.device.select import Device, choose
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from tests.render.shots import engine_of
 
 

@@ -13,7 +13,7 @@ from numpy.linalg import norm
 
 import clfractal
 from clfractal.device.select import choose, has_float64
-from clfractal.files.volume import SCENE_KEY, read_volume
+from clfractal.files.volume_file import SCENE_KEY, read_volume
 from tests.shell import SCENE, InProcess
 
 # z stays where it is: the set is the ball of the bailout's radius, 0.8 around the origin.

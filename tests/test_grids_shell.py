@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.files.kinds import Kind, kind_of
-from clfractal.files.volume import Volume, write_volume
+from clfractal.files.file_kinds import Kind, kind_of
+from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.grid_values import finite_range, in_words, is_finite_somewhere, lacking
 from tests.shell import InProcess
 

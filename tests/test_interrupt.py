@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clfractal.commands.shell import Shell
-from clfractal.commands.unfinished import Unfinished
+from clfractal.cli.shell import Shell
+from clfractal.cli.unfinished import Unfinished
 from clfractal.device.select import choose
+from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
-from clfractal.work.prepare import prepare
 from tests.long_renders import ENDLESS, LIMIT_SECONDS, PROMISE_SECONDS, interrupt
 from tests.shell import SCENE
 

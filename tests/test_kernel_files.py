@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from clfractal.device.orbit import SHAPE_KINDS
 from clfractal.device.source import kinds
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 from clfractal.schema.kinds import members
 from clfractal.schema.shape import solids
 
@@ -51,8 +51,8 @@ def test_each_shape_is_a_file_with_all_functions() -> None:
     assert SHAPE_KINDS.keys() == {kind.tag for kind in members("shapes")}
     assert kinds("elements/shapes/emitters").keys() == {kind.tag for kind in solids()}
     for interface, family, count in (
-        ("shapes.h", "elements/shapes", 5),
-        ("emitter_places.h", "elements/shapes/emitters", 2),
+        ("geometry/shapes.h", "elements/shapes", 5),
+        ("shading/emitter_places.h", "elements/shapes/emitters", 2),
     ):
         asked = re.findall(r"^//   \w+ NAME_(\w+)\(", (kernels / interface).read_text("utf-8"), re.MULTILINE)
         assert len(asked) == count

@@ -11,7 +11,7 @@ from collections.abc import Iterator, Mapping
 from graphlib import CycleError, TopologicalSorter
 from pathlib import PurePosixPath
 
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 
 Graph = dict[str, set[str]]
 

@@ -19,11 +19,11 @@ OWNERS = {
     "yaml": {"files/document.py", "files/spans.py"},
     "OpenEXR": {"files/exr.py"},
     "png": {"files/png.py"},
-    "rich": {"commands/progress.py"},
+    "rich": {"cli/progress.py"},
     "typer": {
-        f"commands/{name}.py"
+        f"cli/{name}.py"
         for name in (
-            "app",
+            "program",
             "options",
             "list_facts",
             "list_grids",
@@ -33,9 +33,9 @@ OWNERS = {
         )
     },
     "cmap": {"scene/palette.py"},
-    "skimage": {"voxels/mesh.py"},
-    "glfw": {"viewer/window.py", "commands/view.py"},
-    "OpenGL": {"viewer/gl.py", "commands/view.py"},
+    "skimage": {"voxels/isosurface.py"},
+    "glfw": {"viewer/window.py", "cli/view.py"},
+    "OpenGL": {"viewer/gl.py", "cli/view.py"},
 }
 
 
@@ -74,7 +74,7 @@ def test_a_library_is_used_in_one_place(module: str) -> None:
 def test_checking_a_scene_needs_no_opencl() -> None:
     """And neither a bar nor a picture library: what is loaded for a command is what it needs."""
     code = (
-        "import sys; from clfractal.cli import run; from clfractal.commands.shell import Shell\n"
+        "import sys; from clfractal.cli import run; from clfractal.cli.shell import Shell\n"
         "import tempfile, pathlib; f = pathlib.Path(tempfile.mkdtemp()) / 's.yaml'\n"
         "f.write_text('version: 1\\nformula: {name: hast}\\ncamera: {}\\n')\n"
         "assert run(['check', str(f)], Shell(owns_process=False)) == 0\n"
@@ -90,23 +90,23 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
     scene = tmp_path / "scene.yaml"
     scene.write_text("version: 1\nformula: {name: hast}\ncamera: {}\n", encoding="utf-8")
     code = (
-        "import sys; from clfractal.cli import run; from clfractal.commands.shell import Shell\n"
+        "import sys; from clfractal.cli import run; from clfractal.cli.shell import Shell\n"
         f"order = ['render', {str(scene)!r}, '--size', '16x16', '-o', {str(tmp_path / 'picture.png')!r}]\n"
         "assert run(order, Shell(owns_process=False)) == 0\n"
         "print(*sys.modules)"
     )
     ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     loaded = set(ended.stdout.splitlines()[-1].split())
-    assert "clfractal.renderers.surface" in loaded
+    assert "clfractal.integrators.surface" in loaded
     own = {
-        *("clfractal.device.buildlog", "clfractal.pictures.anaglyph", "clfractal.pictures.probe"),
-        *("clfractal.renderers.volume", "clfractal.renderers.cut_plane", "clfractal.voxels"),
-        *("clfractal.schema.messages", "clfractal.scene.palette", "clfractal.optics.stereo"),
+        *("clfractal.device.buildlog", "clfractal.images.anaglyph", "clfractal.images.probe"),
+        *("clfractal.integrators.volume", "clfractal.integrators.cut_plane", "clfractal.voxels"),
+        *("clfractal.schema.error_texts", "clfractal.scene.palette", "clfractal.stereo.eyes"),
         *(
-            "clfractal.work.comfort",
-            "clfractal.work.films",
-            "clfractal.work.probing",
-            "clfractal.work.refine",
+            "clfractal.engine.comfort",
+            "clfractal.engine.job_films",
+            "clfractal.engine.probing",
+            "clfractal.engine.refine",
         ),
     }
     foreign = {"OpenEXR", "PIL", "cmap", "mpmath", "rich", "ssl", "xml", "http"}
@@ -131,9 +131,9 @@ def test_the_program_starts_without_what_it_does_not_need(monkeypatch: pytest.Mo
 def test_garbage_is_collected_again_while_a_command_works(tmp_path: Path) -> None:
     code = (
         "import gc; gc.disable()\n"
-        "from clfractal.commands import app, check; from clfractal.commands.shell import Shell\n"
+        "from clfractal.cli import check, program; from clfractal.cli.shell import Shell\n"
         "check.check_scene = lambda *_, **__: print(gc.isenabled(), gc.get_freeze_count() > 0)\n"
-        "app.call(['check', 'scene.yaml'], Shell(owns_process=False))"
+        "program.call(['check', 'scene.yaml'], Shell(owns_process=False))"
     )
     ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert ended.stdout.split() == ["True", "True"]

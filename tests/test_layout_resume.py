@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from clfractal.cli import run
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 from tests.interrupts import planes, watched
 from tests.shell import Ended, InProcess
 

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal import resources
-from clfractal.commands.app import app
+from clfractal.cli.program import app
 from clfractal.errors import FileError
+from clfractal.files import resources
 from clfractal.files.exr import write_exr
 from clfractal.files.inputs import noting, refuse_overwriting
-from clfractal.files.volume import Volume, write_volume
-from clfractal.pictures.film import Film
+from clfractal.files.volume_file import Volume, write_volume
+from clfractal.images.film import Film
 from clfractal.scene.load import load_scene, read_scene
 from tests.shell import SCENE, InProcess
 

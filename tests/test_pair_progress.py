@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.pictures.compose import Side
-from clfractal.work import finish
-from clfractal.work.films import JobFilms
-from clfractal.work.run import Progress, run
+from clfractal.engine import finish
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.run import Progress, run
+from clfractal.images.compose import Side
 from tests.interrupts import planes, watched
 from tests.shell import Ended, InProcess
 

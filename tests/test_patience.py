@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.commands import progress
-from clfractal.commands.film_count import FilmCount
-from clfractal.commands.progress import Patience, Reporter
-from clfractal.commands.shell import Shell
+from clfractal.cli import progress
+from clfractal.cli.film_count import FilmCount
+from clfractal.cli.progress import Patience, Reporter
+from clfractal.cli.shell import Shell
 from clfractal.device import activity
-from clfractal.files import environment, volume
+from clfractal.engine.run import Progress
+from clfractal.files import environment_map as environment
+from clfractal.files import volume_file as volume
 from clfractal.files.exr import write_exr
 from clfractal.scene import load
-from clfractal.work.run import Progress
 
 
 class Terminal(io.StringIO):

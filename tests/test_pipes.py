@@ -12,11 +12,11 @@ import pytest
 from PIL import Image
 
 from clfractal.cli import run
-from clfractal.commands.pipes import is_stream
-from clfractal.commands.shell import Shell
+from clfractal.cli.pipes import is_stream
+from clfractal.cli.shell import Shell
 from clfractal.files.exr import read_exr
 from clfractal.files.regular import MAX_BYTES
-from clfractal.files.volume import read_volume
+from clfractal.files.volume_file import read_volume
 from tests.shell import SCENE, command, environment
 
 

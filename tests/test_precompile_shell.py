@@ -13,12 +13,12 @@ from typing import Any
 
 import pytest
 
-from clfractal import resources
 from clfractal.cli import run
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 from clfractal.device import program
+from clfractal.engine.precompile import library_count, library_scenes
+from clfractal.files import resources
 from clfractal.formulas import catalog
-from clfractal.work.precompile import library_count, library_scenes
 from tests.long_renders import LIMIT_SECONDS
 from tests.shell import SCENE, Ended, InProcess, command, environment, process
 

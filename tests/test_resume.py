@@ -16,12 +16,12 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.shell import Shell
-from clfractal.commands.unfinished import Unfinished, continued
+from clfractal.cli.shell import Shell
+from clfractal.cli.unfinished import Unfinished, continued
 from clfractal.device.select import choose
+from clfractal.engine.prepare import prepare
 from clfractal.files.journal import _HEAD, MAGIC
 from clfractal.scene.load import load_scene
-from clfractal.work.prepare import prepare
 from tests.interrupts import planes
 from tests.long_renders import HEAVY, TILES
 from tests.shell import SCENE, Ended, command, environment, process
@@ -97,7 +97,7 @@ def interrupted(folder: Path) -> None:
     """Leaves the work of the small scene behind: the disk was full when the picture was written."""
     (folder / "scene.yaml").write_text(SCENE)
     code = (
-        "import sys; from clfractal.cli import main; from clfractal.work import finish\n"
+        "import sys; from clfractal.cli import main; from clfractal.engine import finish\n"
         "def full(*_): raise OSError(28, 'No space left on device')\n"
         "finish.save_outputs = lambda *a, **k: full()\n"
         "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'a.png', '--quiet']; main()"

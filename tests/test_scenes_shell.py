@@ -11,17 +11,17 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands import scenes as scenes_command
-from clfractal.commands import watch
-from clfractal.commands.new import scene_text
+from clfractal.cli import show_scenes as scenes_command
+from clfractal.cli import watch
+from clfractal.cli.new import scene_text
+from clfractal.engine import thumbnails
+from clfractal.engine.engine import Engine
+from clfractal.engine.framing import Framing
+from clfractal.engine.quality import PRESETS, with_quality
 from clfractal.errors import SceneError
 from clfractal.files.png import read_png_pixels
 from clfractal.files.watching import Watched
 from clfractal.scene.load import load_scene
-from clfractal.work import thumbnails
-from clfractal.work.engine import Engine
-from clfractal.work.framing import Framing
-from clfractal.work.quality import PRESETS, with_quality
 from tests.shell import SCENE, InProcess
 
 # --- scenes ---

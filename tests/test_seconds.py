@@ -12,10 +12,10 @@ import pytest
 import clfractal
 from clfractal.device import program
 from clfractal.device.select import choose
+from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.renderers.surface import PROGRAMS
-from clfractal.work.run import Progress
+from clfractal.integrators.surface import PROGRAMS
 from tests.shell import SCENE, Ended, InProcess
 
 COMPILING = 1.5  # seconds that a program takes to be built, at least

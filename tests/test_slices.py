@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.slices import Stack, slice_scene
+from clfractal.cli.slices import Stack, slice_scene
+from clfractal.engine import run as work
 from clfractal.files.exr import read_exr
-from clfractal.renderers.cut_plane import renderer_of
+from clfractal.integrators.cut_plane import renderer_of
 from clfractal.scene.load import load_scene
-from clfractal.work import run as work
 from tests.shell import InProcess
 
 SCENE = """version: 1
@@ -65,7 +65,7 @@ def test_interrupted_the_finished_ones_stay(clf: InProcess, monkeypatch: pytest.
             raise KeyboardInterrupt
         return render(*arguments, **settings)
 
-    monkeypatch.setattr("clfractal.commands.numbered.run", interrupted)
+    monkeypatch.setattr("clfractal.cli.numbered.run", interrupted)
     with pytest.raises(KeyboardInterrupt):
         clf("slices", "scene.yaml", "--count", "4")
     assert names() == ["slice_0001.png", "slice_0002.png"]

@@ -15,10 +15,10 @@ from hypothesis import strategies as st
 from scipy.io import wavfile
 
 import clfractal
+from clfractal.engine.loudness import Shaping, loudness, shaped
 from clfractal.errors import FileError
 from clfractal.files.columns import read_columns
 from clfractal.files.sound import Sound, read_sound
-from clfractal.work.loudness import Shaping, loudness, shaped
 from tests.shell import InProcess
 
 SCENE = None  # of these tests each writes its own

@@ -10,13 +10,13 @@ import pytest
 from PIL import Image
 
 import clfractal
+from clfractal.engine.comfort import fitted
+from clfractal.engine.run import Progress
 from clfractal.files.srgb import encode8
 from clfractal.files.tone import toned
-from clfractal.pictures.compose import compose
+from clfractal.images.compose import compose
 from clfractal.scene import given
 from clfractal.scene.stereo import Stereo
-from clfractal.work.comfort import fitted
-from clfractal.work.run import Progress
 from tests.render.volumes import keep
 from tests.shell import SCENE
 

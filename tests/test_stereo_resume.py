@@ -31,7 +31,7 @@ LEFT, RIGHT = "out.exr.partial", "out.exr.right.partial"
 SLOWLY = """
 import sys, time
 from clfractal.cli import main
-from clfractal.pictures.store import JournalFilm
+from clfractal.images.store import JournalFilm
 put = JournalFilm.put
 def slowly(*arguments):
     put(*arguments)

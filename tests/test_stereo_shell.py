@@ -15,8 +15,8 @@ from PIL import Image
 from clfractal.errors import STATUS_BAD_INPUT
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.pictures.compose import compose
-from clfractal.pictures.modes import picture_size
+from clfractal.images.compose import compose
+from clfractal.images.modes import picture_size
 from clfractal.scene.load import load_scene
 from clfractal.scene.stereo import Stereo
 from tests.shell import SCENE, InProcess
@@ -57,7 +57,7 @@ def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
 def eyes(tmp_path_factory: pytest.TempPathFactory) -> tuple[Planes, Planes]:
     """Both eyes' channels, as `mode: pair` writes them."""
     from clfractal.cli import run
-    from clfractal.commands.shell import Shell
+    from clfractal.cli.shell import Shell
 
     folder = tmp_path_factory.mktemp("eyes")
     (folder / "scene.yaml").write_text(STEREO)

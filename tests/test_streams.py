@@ -11,8 +11,8 @@ import pytest
 
 import clfractal
 from clfractal.cli import run
-from clfractal.commands.progress import shown_rate
-from clfractal.commands.shell import Shell
+from clfractal.cli.progress import shown_rate
+from clfractal.cli.shell import Shell
 from tests.shell import SCENE, Ended, environment, process
 
 posix = pytest.mark.skipif(os.name != "posix", reason="the shell of this system cannot close streams")
@@ -82,7 +82,7 @@ def test_an_interrupt_before_the_first_tile(here: Path, monkeypatch: pytest.Monk
     def interrupted(*_: object, **__: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("clfractal.work.local.LocalExecutor.execute", interrupted)
+    monkeypatch.setattr("clfractal.engine.local_executor.LocalExecutor.execute", interrupted)
     shell = Shell(owns_process=False)
     with pytest.raises(KeyboardInterrupt):
         run(["render", "scene.yaml", "-o", "out.png"], shell)
@@ -94,7 +94,7 @@ def test_an_interrupt_after_some_tiles(here: Path, monkeypatch: pytest.MonkeyPat
     def interrupted(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("clfractal.commands.progress.Reporter.__call__", interrupted)
+    monkeypatch.setattr("clfractal.cli.progress.Reporter.__call__", interrupted)
     shell = Shell(owns_process=False)
     with pytest.raises(KeyboardInterrupt):
         run(["render", "scene.yaml", "-o", "out.png"], shell)

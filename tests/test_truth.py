@@ -24,12 +24,12 @@ from benchmarks.truth.solid import Solid
 from benchmarks.truth.sphere import measure_sphere
 from benchmarks.truth.steps import Steps
 from benchmarks.truth.subjects import bare
-from clfractal.commands import bench
+from clfractal.camera.views import scene_view
+from clfractal.cli import bench
+from clfractal.engine.engine import Engine
 from clfractal.formulas import catalog
-from clfractal.optics.view import scene_view
-from clfractal.renderers.points import Distances, escape
+from clfractal.integrators.points import Distances, escape
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 
 JULIA = {"name": "quaternion_julia", "julia": [0, 0, 0, 0], "iterations": 30}
 CAMERAS = {

@@ -18,9 +18,9 @@ from benchmarks.truth.losses import measure_losses
 from benchmarks.truth.picture import Seen, see
 from benchmarks.truth.solid import Solid
 from benchmarks.truth.subjects import Subject, bare, subjects
-from clfractal.commands import bench
+from clfractal.cli import bench
+from clfractal.engine.engine import Engine
 from clfractal.scene.load import load_scene
-from clfractal.work.engine import Engine
 
 SIDE = 160
 # A sheet of hardly any thickness in the plane z = 0, and a thread above it, along (1, 0.2, 0); the pixel is 0.0125 wide.

@@ -12,10 +12,10 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.commands import vary
-from clfractal.files.environment import read_environment
+from clfractal.cli import vary
+from clfractal.engine.engine import Engine
+from clfractal.files.environment_map import read_environment
 from clfractal.scene.load import load_scene
-from clfractal.work.engine import Engine
 from tests.shell import SCENE, InProcess
 
 SMALL = ("--size", "32x18", "--count", "3")
@@ -189,7 +189,7 @@ def test_nothing_that_could_change(clf: InProcess) -> None:
 def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     import shutil
 
-    from clfractal.resources import folder
+    from clfractal.files.resources import folder
 
     Path("maps").mkdir()
     shutil.copy(folder("environments") / "dusk.exr", "maps/sky.exr")

@@ -64,11 +64,11 @@ def test_a_fresh_environment_renders_from_the_wheel(wheel: Path, tmp_path: Path)
     assert told.stderr == "clfractal mesh: needs scikit-image: pip install scikit-image\n"
     loaded = run(
         python,
-        *("-c", "import sys, clfractal.api, clfractal.work.engine, clfractal.resources as r\n"),
+        *("-c", "import sys, clfractal.api, clfractal.engine.engine, clfractal.files.resources as r\n"),
         folder=work,
     )
     assert loaded == ""
-    code = "from clfractal import resources\nprint(resources.folder('kernels'), resources.folder('scenes'))"
+    code = "from clfractal.files import resources\nprint(resources.folder('kernels'), resources.folder('scenes'))"
     for folder in run(python, "-c", code, folder=work).split():
         assert Path(folder).is_relative_to(environment)
 

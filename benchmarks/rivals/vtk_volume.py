@@ -40,12 +40,12 @@ class VtkVolume:
         # Without one it ends the process.
         if sys.platform == "linux" and not os.environ.get("DISPLAY"):
             raise MissingError("VTK needs a display (xvfb-run -a)")
-        from clfractal.commands.bench import VOLUME
+        from clfractal.cli.bench import VOLUME
         from clfractal.device.select import choose
-        from clfractal.renderers.volume import settings_of
+        from clfractal.engine.prepare import prepare
+        from clfractal.integrators.volume import settings_of
         from clfractal.scene.load import load_scene
         from clfractal.voxels.fill import fill_grid
-        from clfractal.work.prepare import prepare
 
         version = vtk.vtkVersion()
         device = choose()

@@ -23,9 +23,9 @@ from benchmarks.truth.picture import see
 from benchmarks.truth.report import Report
 from benchmarks.truth.solid import Solid
 from benchmarks.truth.subjects import SIDE, subjects
+from clfractal.engine.engine import Engine
 from clfractal.errors import ClfractalError
 from clfractal.files.atomic import check_output
-from clfractal.work.engine import Engine
 
 LEGEND = f"""\
 Hits, distances in widths of a pixel: the share with an inside point within 1, 1.5 and 3 ({hits.PLACES} random places), how

@@ -1,11 +1,11 @@
 // Which points belong to the solid that the search for a surface looks for. One work-item takes LANES points in a row.
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/powers.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "formulas/numbers/powers.h"
+#include "device/vectors.h"
 #include "structs.h"
 #include "formula.h"
-#include "orbit.h"
+#include "formulas/orbit.h"
 
 // Points are stored as all x, then all y, then all z, each `stride` numbers long; `stride` is a multiple of LANES.
 __kernel void inside(__global const scalar *points, __global char *result, int stride, __constant const struct Orbit *orbit,

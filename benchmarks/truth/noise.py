@@ -24,12 +24,12 @@ import numpy.typing as npt
 import yaml
 
 from benchmarks.truth.rays import Floats
+from clfractal.camera.views import scene_view
+from clfractal.engine.engine import Engine
 from clfractal.files.srgb import encode
-from clfractal.optics.view import scene_view
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 
 Figures = tuple[float, float, float, float]
 """Noise, flicker, the noise within, the noise that is shown."""
@@ -120,7 +120,7 @@ def moved(scene: Scene, left: float, down: float) -> Scene:
 
 
 def smoothed(colors: npt.NDArray[Any], coverage: npt.NDArray[Any], strength: float = 1.0) -> npt.NDArray[Any]:
-    """What a window shows of a view under way, as light: `diffuse` in `kernels/show.cl`, in the same order.
+    """What a window shows of a view under way, as light: `diffuse` in `show.cl`, in the same order.
 
     Args:
         colors: shape (height, width, 3), linear; coverage: shape (height, width). The result has the colours' type.

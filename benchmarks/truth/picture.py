@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.truth.rays import Floats, Rays, all_pixels, pixel_rays, ray_distances
-from clfractal.pictures.film import Film
+from clfractal.engine.engine import Engine
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 
 
 @dataclass(frozen=True, slots=True)

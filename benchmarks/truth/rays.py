@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import scene_view
-from clfractal.pictures.film import Film
+from clfractal.camera.views import scene_view
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]
@@ -22,7 +22,7 @@ class Rays:
 
     Attributes:
         origin, direction: shape (n, 3), scene units; directions have length 1.
-        footprint, spread: shape (n,): a pixel is footprint + spread * t wide at distance t (as `kernels/camera.h`).
+        footprint, spread: shape (n,): a pixel is footprint + spread * t wide at distance t (as `camera.h`).
         near, far: the part within the scene's bounds, shape (n,); empty (near >= far) where a ray misses them.
     """
 

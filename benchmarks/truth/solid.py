@@ -16,10 +16,10 @@ from clfractal.device.watched import Watched
 from clfractal.errors import DeviceError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import records
-from clfractal.renderers.declarations import struct_text
-from clfractal.renderers.lanes import best_lanes, rule_of
-from clfractal.renderers.points import Distances, distances
+from clfractal.integrators import records
+from clfractal.integrators.declarations import struct_text
+from clfractal.integrators.lanes import best_lanes, rule_of
+from clfractal.integrators.points import Distances, distances
 
 Floats = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

@@ -10,7 +10,7 @@ import numpy as np
 from benchmarks.truth.picture import see
 from benchmarks.truth.rays import chord
 from benchmarks.truth.subjects import bare
-from clfractal.work.engine import Engine
+from clfractal.engine.engine import Engine
 
 MOST_AREA, MOST_DEPTH, MOST_NORMAL = 0.002, 0.1, 0.05
 """Targets: the area's relative error; at 99 % of the hits depth in pixel widths, and normals in degrees."""

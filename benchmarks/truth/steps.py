@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clfractal.commands import bench
+from clfractal.cli import bench
+from clfractal.engine.engine import Engine
 from clfractal.scene.load import load_scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.work.engine import Engine
 
 SHARE = 0.75
 """Of the steps on record, at most so many are to be taken."""

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clfractal import resources
 from clfractal.errors import ClfractalError, Where, unknown_name
+from clfractal.files import resources
 from clfractal.formulas import catalog
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene

@@ -17,22 +17,21 @@ from uuid import uuid4
 
 import numpy as np
 
-from clfractal import arguments
-from clfractal.cluster import local
+from clfractal.cluster import local_cluster as local
 from clfractal.cluster.dispatch import Dispatcher, Work
 from clfractal.cluster.guard import check_main
 from clfractal.cluster.link import ANSWER_SECONDS, Link, usual_key
-from clfractal.cluster.local import Place
+from clfractal.cluster.local_cluster import Place
 from clfractal.cluster.message import Array, Digests, Message, pack, unpack
 from clfractal.device.activity import doing
 from clfractal.device.cancel import CancelToken
-from clfractal.errors import ClfractalError, DeviceError
-from clfractal.pictures.tiles import TileGrid
-from clfractal.work.job import Job
-from clfractal.work.run import Result, WorkItem
+from clfractal.engine.job import Job
+from clfractal.engine.run import Result, WorkItem
+from clfractal.errors import ClfractalError, DeviceError, arguments
+from clfractal.images.tiles import TileGrid
 
 if TYPE_CHECKING:
-    from clfractal.cluster.engine import ClusterEngine
+    from clfractal.cluster.cluster_engine import ClusterEngine
     from clfractal.cluster.tasks import Answer
 
 # How often who waits looks for Ctrl-C and tokens, seconds.
@@ -141,7 +140,7 @@ class Cluster:
 
     def engine(self) -> ClusterEngine:
         """An engine whose decisions are made, and whose pictures are rendered, on the workers."""
-        from clfractal.cluster.engine import ClusterEngine
+        from clfractal.cluster.cluster_engine import ClusterEngine
 
         return ClusterEngine(self)
 

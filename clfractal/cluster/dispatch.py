@@ -18,10 +18,10 @@ from uuid import uuid4
 from clfractal.cluster.link import Link, Lost, Tell, usual_key
 from clfractal.cluster.message import Array, Message
 from clfractal.cluster.sizes import Pace
+from clfractal.engine.job import Job
+from clfractal.engine.run import WorkItem
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
-from clfractal.pictures.tiles import TILE
-from clfractal.work.job import Job
-from clfractal.work.run import WorkItem
+from clfractal.images.tiles import TILE
 
 RETURN_SECONDS = 60.0
 """How long a scheduler may be gone, or be without workers, before a render ends."""

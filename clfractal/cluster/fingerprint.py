@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 from functools import cache
 
-from clfractal import resources
+from clfractal.files import resources
 
 _LENGTH = 12
 

@@ -14,9 +14,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
-from clfractal import resources
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.device.select import DeviceInfo, has_float64
+from clfractal.files import resources
 
 if TYPE_CHECKING:
     from clfractal.cluster.tasks import Seat

@@ -19,19 +19,20 @@ import numpy as np
 from distributed import WorkerPlugin, get_worker
 from distributed.utils import sync
 
-from clfractal import errors, resources
+from clfractal import errors
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.cluster.message import Arrays, Digests, Message, pack, unpack
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, DeviceInfo, choose, has_float64
+from clfractal.engine.job import Job
+from clfractal.engine.prepare import pays_to_measure, with_lanes
+from clfractal.engine.run import Counters, Floats, Tiles, WorkItem
 from clfractal.errors import ClfractalError, Stopped, Where
-from clfractal.pictures.provenance import RenderDevice
-from clfractal.work.job import Job
-from clfractal.work.prepare import pays_to_measure, with_lanes
-from clfractal.work.run import Counters, Floats, Tiles, WorkItem
+from clfractal.files import resources
+from clfractal.images.provenance import RenderDevice
 
 if TYPE_CHECKING:
-    from clfractal.work.engine import Engine
+    from clfractal.engine.engine import Engine
 
 T = TypeVar("T")
 
@@ -250,7 +251,7 @@ def _token() -> Iterator[CancelToken]:
 
 
 def _engine(seat: Seat) -> Engine:
-    from clfractal.work.engine import Engine
+    from clfractal.engine.engine import Engine
 
     if seat not in _engines:
         _engines[seat] = Engine(seat.device)

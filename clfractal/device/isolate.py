@@ -16,11 +16,12 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from clfractal import errors, resources
+from clfractal import errors
 from clfractal.device import children, drivers_folder
 from clfractal.device.child import ANSWER, FAILED, NOISE, REQUEST
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError, UntriedError
+from clfractal.files import resources
 
 _NOISE_SHOWN = 20_000  # characters
 # Signals that no driver ends a process by: other programs send them, and the system where memory or time is short.

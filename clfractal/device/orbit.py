@@ -1,4 +1,4 @@
-"""The limits of an orbit, as the kernels read them (`kernels/orbit.h`)."""
+"""The limits of an orbit, as the kernels read them (`kernels/formulas/orbit.h`)."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ ORBIT = Struct(
         Field("log_distance_bailout", "real", 0, "natural logarithm of the distance bailout"),
         Field("log2_degree", "real", 0, "binary logarithm of the degree of one application"),
         Field("solid_radius", "real", 0, "radius in z that holds the last solid, for degree 1"),
-        # Of one of several solids that are joined (`kernels/solids.h`); else 0.
+        # Of one of several solids that are joined (`kernels/formulas/solids.h`); else 0.
         Field("kind", "int", 0, "one of SOLID_KINDS"),
         Field("join", "int", 0, "one of JOINS"),
         Field("solids", "int", 0, "how many there are"),
@@ -106,7 +106,7 @@ def orbit_record(
     Args:
         bailout: in the place of the formula's own.
         potential: whether normals are of the last z, however many applications that takes.
-        joined: values of the fields that say which of several solids this is; see `clfractal/solids.py`.
+        joined: values of the fields that say which of several solids this is; see `clfractal/geometry/solids.py`.
     """
     inner = bailout if bailout is not None else chain.bailout
     outer = max(inner, chain.distance_bailout)

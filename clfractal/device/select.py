@@ -18,7 +18,6 @@ from typing import Any, Literal
 
 import pyopencl as cl
 
-from clfractal.arguments import plain, shown
 from clfractal.device import bundled, cache, drivers_folder
 from clfractal.device.advice import install_hint
 from clfractal.device.driver_errors import error_code, is_out_of_memory
@@ -34,6 +33,7 @@ from clfractal.errors import (
     Where,
     unknown_name,
 )
+from clfractal.errors.arguments import plain, shown
 
 # pyopencl's own cache holds only how arguments are passed. It lies in the home folder, where one may not be able to
 # write, and reading it takes longer than making its contents anew (15 ms of a start, instead of 10).

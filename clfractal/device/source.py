@@ -13,7 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 
 from clfractal.errors import KernelBuildError, Where, nearest
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
 _NAME = re.compile(r"[A-Za-z_]\w*")

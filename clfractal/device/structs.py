@@ -58,7 +58,7 @@ class Struct:
     def c_text(self, precision: Precision | None = None) -> str:
         """The declaration; in C both `Name` and `struct Name` can be written.
 
-        Without a precision, fields of type `real` get the type `scalar` of `kernels/lanes.h`, which must
+        Without a precision, fields of type `real` get the type `scalar` of `lanes.h`, which must
         stand before.
         """
         return "\n".join(self._c_lines(precision)) + "\n"

@@ -24,7 +24,7 @@ from clfractal.errors import (
 )
 
 LANE_COUNTS = (1, 4, 8, 16)
-PROBE = "clfractal.device.probe:lanes_job"
+PROBE = "clfractal.device.lane_probe:lanes_job"
 PROBE_TIMEOUT_S = 120.0
 
 _VERSION = 7  # of the probes: older measurements no longer count

@@ -108,7 +108,7 @@ ALBEDO: tuple[str, ...] = layer("albedo")
 LIGHT_LAYERS: tuple[str, ...] = (*layer("emission"), *layer("direct"), *layer("indirect"))
 """Parts of the picture by how often light was reflected; only paths know them."""
 SURFACE_LAYERS: tuple[str, ...] = (*ALBEDO, *LIGHT_LAYERS, *NORMAL)
-"""Channels that only surfaces have, in the order of `parts` in `kernels/pixel.h`."""
+"""Channels that only surfaces have, in the order of `parts` in `kernels/integrators/pixel.h`."""
 NUMBERED: tuple[str, ...] = ("object", "material")
 OBJECT_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoObject"))
 MATERIAL_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoMaterial"))

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
 
-from clfractal.files.kinds import Kind, kind_of
+from clfractal.files.file_kinds import Kind, kind_of
 
 _MODULES: dict[Kind, str] = {"exr": "exr_header", "png": "png", "photo": "photo"}
 

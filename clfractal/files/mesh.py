@@ -17,7 +17,7 @@ from typing import Any, BinaryIO
 import numpy as np
 import numpy.typing as npt
 
-from clfractal import arguments
+from clfractal.errors import arguments
 from clfractal.files.atomic import atomic_writer, check_output, file_error
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.srgb import encode

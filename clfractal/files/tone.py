@@ -1,7 +1,7 @@
 """Tone curves: light without limits to light that a screen can show, 0 to 1, both linear Rec. 709.
 
 Every curve leaves black black, neutral colours neutral, and middle grey (`MIDDLE`) as it is; it never falls, and reaches
-white at `WHITE`. The arithmetic is single additions and multiplications around a table, so that `kernels/tone.h` can do
+white at `WHITE`. The arithmetic is single additions and multiplications around a table, so that `tone.h` can do
 the same, bit for bit.
 
 - reinhard: E. Reinhard, M. Stark, P. Shirley, J. Ferwerda, "Photographic Tone Reproduction for Digital Images",
@@ -19,7 +19,7 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.curves import TONES, Tone
+from clfractal.files.tone_names import TONES, Tone
 
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]

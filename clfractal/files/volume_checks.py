@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal import arguments
-from clfractal.errors import SceneError, Where
+from clfractal.errors import SceneError, Where, arguments
 
 
 def grid_of(values: Any) -> npt.NDArray[Any]:

@@ -8,8 +8,8 @@ from functools import lru_cache
 from typing import Any
 
 from clfractal.errors import FormulaError, Where, unknown_name
+from clfractal.formulas.definition import MAX_REPEAT, BoundFormula, Formula, inside
 from clfractal.formulas.evaluate import MAX_EXPONENT, as_function, finite
-from clfractal.formulas.model import MAX_REPEAT, BoundFormula, Formula, inside
 from clfractal.formulas.nodes import Call, Node, names_in, walk
 
 MAX_RADIUS = 1e6

@@ -9,7 +9,7 @@ from typing import Any
 
 from clfractal.errors import FormulaError, Where, unknown_name
 from clfractal.formulas.binding import check_constant
-from clfractal.formulas.model import Add, Formula, Parameter, inside, point_name
+from clfractal.formulas.definition import Add, Formula, Parameter, inside, point_name
 from clfractal.formulas.nodes import FUNCTIONS, Node, names_in, walk
 from clfractal.formulas.nodes import Call as CallNode
 from clfractal.formulas.parser import parse

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any
 
 from clfractal.errors import FileError, FormulaError, Where, unknown_name
+from clfractal.files.resources import folder
 from clfractal.formulas.binding import bind, check_radius
 from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_from_mapping
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
+from clfractal.formulas.definition import Formula, inside
 from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.model import Formula, inside
 from clfractal.formulas.own import check_inside, find_own, library_names
 from clfractal.formulas.turns import MAX_START
-from clfractal.resources import folder
 
 _SOURCES = ("name", "file", "inline", "chain")
 _OPTIONS = ("parameters", "live", "julia", "bailout", "distance_bailout")

@@ -9,7 +9,7 @@ from functools import cached_property
 from typing import Any
 
 from clfractal.errors import FormulaError, Where
-from clfractal.formulas.model import Add, BoundFormula
+from clfractal.formulas.definition import Add, BoundFormula
 from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64

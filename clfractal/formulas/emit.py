@@ -266,7 +266,7 @@ class Emitter:
         return self._operation("pow", base, exponent)
 
     def _raised(self, base: Value, exponent: Value) -> Value:
-        """base ** exponent where the exponent is data; see `kernels/numbers/powers.h`."""
+        """base ** exponent where the exponent is data; see `kernels/formulas/numbers/powers.h`."""
         passed = self._exponent(exponent)
         if self.number_type == "dual" and base.kind == "varying":
             return self._statement("dual", "varying", "dual_raised", base.text, *passed)
@@ -324,7 +324,7 @@ class Emitter:
         return square
 
     def _raised_complex(self, x: Value, y: Value, exponent: Value) -> tuple[Value, Value]:
-        """(x + iy)^n where n is data; see `kernels/numbers/powers.h`."""
+        """(x + iy)^n where n is data; see `kernels/formulas/numbers/powers.h`."""
         passed = self._exponent(exponent)
         if self.number_type == "dual" and "varying" in (x.kind, y.kind):
             pair = self._statement(

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True, slots=True)
 class Facts:
-    """What `kernels/orbit.h` has to know of a formula before it.
+    """What `kernels/formulas/orbit.h` has to know of a formula before it.
 
     Attributes:
         size: numbers of its state.

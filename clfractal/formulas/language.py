@@ -3,8 +3,8 @@
 from clfractal.formulas.binding import bind
 from clfractal.formulas.build import formula_from_mapping
 from clfractal.formulas.chain import Chain, Link, single
+from clfractal.formulas.definition import BoundFormula, Formula, Parameter, point_name
 from clfractal.formulas.evaluate import MAX_EXPONENT, TINY, evaluate_constant, whole
-from clfractal.formulas.model import BoundFormula, Formula, Parameter, point_name
 from clfractal.formulas.nodes import (
     ARITHMETIC,
     COMPARISONS,

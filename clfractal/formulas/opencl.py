@@ -1,4 +1,4 @@
-"""Writes a chain of formulas as OpenCL C over packets: the functions that `kernels/orbit.h` iterates.
+"""Writes a chain of formulas as OpenCL C over packets: the functions that `orbit.h` iterates.
 
 The text depends on the expressions, on counts, and on two facts that follow from values: whether the degree is above 1, and
 whether f(0) is a finite number. Everything else is in `constants`, the values of the kernel argument `k`. So a text is
@@ -42,7 +42,7 @@ class FormulaText:
     """A chain in OpenCL C.
 
     Attributes:
-        text: the definitions that `kernels/orbit.h` expects before it; of a leaf its functions alone. Equal texts are one
+        text: the definitions that `orbit.h` expects before it; of a leaf its functions alone. Equal texts are one
             object.
         constants: values of the run-time array `k`, in order; never empty.
     """

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clfractal.errors import FileError, FormulaError, Where, unknown_name
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 
 FOLDERS_VARIABLE = "CLFRACTAL_FORMULAS"
 FOLDER = "formulas"

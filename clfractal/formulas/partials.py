@@ -3,7 +3,7 @@
 A formula's map depends on each component in few places, so its own 3 x 3 (or 4 x 4) Jacobian is sparse and shares much with
 the map; multiplying it by the J carried along often costs less than carrying three partials through every operation.
 Forward rules as in Griewank & Walther, Evaluating Derivatives, 2nd ed. (SIAM 2008), ch. 3; conventions at kinks and poles
-as in `kernels/numbers/dual.h`.
+as in `kernels/formulas/numbers/dual.h`.
 """
 
 from __future__ import annotations

@@ -22,8 +22,8 @@ from clfractal.formulas.backends import (
     seeded,
 )
 from clfractal.formulas.chain import Chain
+from clfractal.formulas.definition import BoundFormula, point_name
 from clfractal.formulas.evaluate import Backend, evaluate, evaluate_constant
-from clfractal.formulas.model import BoundFormula, point_name
 
 __all__ = [
     "DualBackend",

@@ -34,7 +34,7 @@ class Together:
     """Formulas in one text.
 
     Attributes:
-        text: the definitions that `kernels/orbit.h` expects before it.
+        text: the definitions that `kernels/formulas/orbit.h` expects before it.
         formulas: of each formula its functions and constants; equal functions are there once.
         firsts: where the constants of each begin.
         constants: all of them, each formula's behind its leaf.

@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.scene.objects import MAX_OBJECTS
-from clfractal.scene.plane import Plane
+from clfractal.scene.rectangle import Plane
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.schema.fields import WHOLE, Usual

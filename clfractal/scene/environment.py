@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from clfractal import resources
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, SceneError, Where, unknown_name
+from clfractal.files import resources
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Environment
@@ -73,7 +73,7 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
             return EnvironmentMap(bake(environment.sky), sun=sun_of(environment.sky))
     if environment.file is None:
         return _shipped(environment.name or "")
-    from clfractal.files.environment import read_environment
+    from clfractal.files.environment_map import read_environment
     from clfractal.formulas.catalog import safe_path
 
     where = Where(path="environment.file")
@@ -88,7 +88,7 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
 @cache
 def _shipped(name: str) -> EnvironmentMap:
     """A map that comes with the program; it is small and read only once."""
-    from clfractal.files.environment import read_environment
+    from clfractal.files.environment_map import read_environment
 
     pixels = read_environment(resources.folder("environments") / f"{name}.exr")
     pixels.flags.writeable = False

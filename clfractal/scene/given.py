@@ -70,7 +70,7 @@ def read_grid(file: str, folder: Path, where: Where, box: Box | None = None) -> 
 
 
 def _read(path: Path, where: Where, box: Box | None) -> GivenGrid:
-    from clfractal.files.volume import read_volume
+    from clfractal.files.volume_file import read_volume
 
     try:
         volume = read_volume(path)

@@ -12,13 +12,12 @@ from typing import Any
 
 from pydantic import ValidationError
 
-from clfractal import arguments
 from clfractal.device.activity import doing
-from clfractal.errors import ClfractalError, FileError, SceneError, Where
+from clfractal.errors import ClfractalError, FileError, SceneError, Where, arguments
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.embedded import read_scene_text
+from clfractal.files.file_kinds import kind_of
 from clfractal.files.inputs import noting
-from clfractal.files.kinds import kind_of
 from clfractal.files.marks import Document, Node, node_from_plain, option
 from clfractal.files.regular import read_text_file
 from clfractal.scene.checks import check_parts
@@ -185,7 +184,7 @@ def _validated(text: SceneText, overrides: Sequence[str], folder: Path) -> tuple
     try:
         return document, Scene.model_validate(plain, context={"folder": folder})
     except ValidationError as error:
-        from clfractal.schema.messages import first_error
+        from clfractal.schema.error_texts import first_error
 
         raise first_error(error, document, Scene) from error
 

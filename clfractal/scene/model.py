@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, model_validator
 
-from clfractal.arguments import plain
 from clfractal.errors import ClfractalError
+from clfractal.errors.arguments import plain
 from clfractal.files.inputs import noting
 from clfractal.scene.animation import Animation
 from clfractal.scene.bookmarks import Bookmarks
@@ -23,6 +23,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting, PathLighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
+from clfractal.scene.moved_cameras import with_words
 from clfractal.scene.objects import FormulaObject, Objects, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.reads import Reads, is_data, is_table, section_of
@@ -31,7 +32,6 @@ from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.scene.words import with_words
 from clfractal.schema.base import Section, Vector, own_errors
 from clfractal.schema.shape import Joined, Solid
 

@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validator
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES, unknown_channel
-from clfractal.files.curves import Tone
+from clfractal.files.tone_names import Tone
 from clfractal.scene.camera_base import CameraBase
 from clfractal.schema.base import (
     Amount,

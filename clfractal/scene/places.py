@@ -190,7 +190,7 @@ def descended(chain: Chain, points: Floats, iterations: int, tolerance: float) -
 
 
 def trap_distances(chain: Chain, points: Floats, iterations: int, trap: Trap) -> Floats:
-    """Smallest distance of z_1, z_2, ... from the trap, of points of shape (n, 3); as in `kernels/coloring.h`."""
+    """Smallest distance of z_1, z_2, ... from the trap, of points of shape (n, 3); as in `coloring.h`."""
     backend = reference.NumpyBackend()
     result = np.full(len(points), np.inf)
     with np.errstate(all="ignore"):

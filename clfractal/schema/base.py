@@ -19,8 +19,8 @@ from pydantic import (
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
-from clfractal.arguments import plain
 from clfractal.errors import SceneError, Where
+from clfractal.errors.arguments import plain
 from clfractal.schema.fields import DIRECTION, PLACE
 from clfractal.schema.hex_color import AS_TEXT
 
@@ -67,7 +67,7 @@ def own_errors(cls: Any) -> Iterator[None]:
     except ValidationError as error:
         # Loaded for mistakes only.
         from clfractal.files.marks import Document, node_from_plain
-        from clfractal.schema.messages import first_error
+        from clfractal.schema.error_texts import first_error
 
         raise first_error(error, Document(node_from_plain({}, None)), cls) from None
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from clfractal.optics.view import View, scene_view
+from clfractal.camera.views import View, scene_view
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
-from clfractal.scene.plane import Plane
+from clfractal.scene.rectangle import Plane
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.sight import sight_in

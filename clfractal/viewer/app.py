@@ -9,24 +9,25 @@ from typing import Any
 
 from imgui_bundle import imgui
 
+from clfractal.camera.views import scene_view, seen_by
 from clfractal.device.select import choose, devices
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
-from clfractal.optics.view import scene_view, seen_by
 from clfractal.scene.stereo import MIDDLE
-from clfractal.viewer import marks, window
+from clfractal.viewer import marked_lines as marks
+from clfractal.viewer import window
 from clfractal.viewer.begin import Begun
 from clfractal.viewer.depth_range import DepthRange
-from clfractal.viewer.inputs import Inputs
+from clfractal.viewer.input_events import Inputs
 from clfractal.viewer.measuring import Measuring
 from clfractal.viewer.operators import Operators
 from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.panels import all_panels, timeline_area
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.places import places_of
 from clfractal.viewer.room import Room
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.shots import Drawn
 from clfractal.viewer.ui_renderer import UiRenderer
+from clfractal.viewer.window_places import places_of
 from clfractal.viewer.workspace import Workspace
 
 _IDLE_SECONDS = 0.5

@@ -11,20 +11,20 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.finish import save_job
+from clfractal.engine.job import Job
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare
+from clfractal.engine.preview import Preview
+from clfractal.engine.run import Progress, run
+from clfractal.engine.settle import settled
 from clfractal.errors import ClfractalError, Stopped
-from clfractal.pictures.develop import rgb8
-from clfractal.pictures.film import Film
+from clfractal.images.develop import rgb8
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from clfractal.viewer.fitting import Cancellable, measured_exposure, with_exposure
 from clfractal.viewer.preparing import internal_error
-from clfractal.work.films import JobFilms
-from clfractal.work.finish import save_job
-from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.prepare import prepare
-from clfractal.work.preview import Preview
-from clfractal.work.run import Progress, run
-from clfractal.work.settle import settled
 
 Pixels = npt.NDArray[np.uint8]
 Tell = Callable[[str], None]

@@ -16,10 +16,10 @@ from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.scene.model import Scene
 from clfractal.viewer import window
 from clfractal.viewer.files import Files
-from clfractal.viewer.memory import give_memory_back
-from clfractal.viewer.options import Options
+from clfractal.viewer.freed_memory import give_memory_back
 from clfractal.viewer.recording import Recording, read_recording
 from clfractal.viewer.sources import same_file
+from clfractal.viewer.window_options import Options
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from clfractal.pictures.modes import eye_at
+from clfractal.images.modes import eye_at
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box

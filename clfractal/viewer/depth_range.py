@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+from clfractal.engine.comfort import LIMIT_DEGREES, Comfort, comfort_of_depth
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.display import Shown
-from clfractal.work.comfort import LIMIT_DEGREES, Comfort, comfort_of_depth
 
 # A warning is told again only after the picture was this far on the good side.
 _GOOD = 0.95 * LIMIT_DEGREES

@@ -13,10 +13,10 @@ import pyopencl as cl
 
 from clfractal.device.gl_sharing import SharedTexture
 from clfractal.device.select import Device
+from clfractal.engine.show import Look, Shower
 from clfractal.errors import ClfractalError, DeviceError
-from clfractal.pictures.tiled import Floats
+from clfractal.images.tiled import Floats
 from clfractal.viewer.frame import CanvasPool, Frame
-from clfractal.work.show import Look, Shower
 
 
 class Target(Protocol):

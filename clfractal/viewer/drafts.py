@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.job import Job
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
 from clfractal.scene.light_paths import DirectLighting, PathLighting
 from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight
@@ -12,8 +14,6 @@ from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import differs_by_view, sharp
-from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
 
 # In the place of the light of a sky: how bright a white surface that faces the eye is on the screen.
 _HEADLIGHT = 0.7

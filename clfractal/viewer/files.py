@@ -7,20 +7,20 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal import resources
 from clfractal.errors import SceneError
+from clfractal.files import resources
 from clfractal.files.atomic import check_output
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, Recovered
-from clfractal.viewer.options import Options
 from clfractal.viewer.reloading import Reloading, loaded_again
 from clfractal.viewer.saving import save_scene, scene_text
 from clfractal.viewer.shots import Drawn, Shots, free_name
 from clfractal.viewer.sources import SceneSource, is_protected, open_source, suggested_name
+from clfractal.viewer.window_options import Options
 
 if TYPE_CHECKING:
-    from clfractal.viewer.outputs import Outputs
+    from clfractal.viewer.screens import Outputs
     from clfractal.viewer.settings import Settings
     from clfractal.viewer.studio import Studio
 

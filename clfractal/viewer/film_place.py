@@ -16,11 +16,11 @@ from clfractal.scene.animation import Animation
 from clfractal.scene.camera_base import PLACE, CameraBase
 from clfractal.scene.curves import same
 from clfractal.scene.model import Scene
+from clfractal.scene.moved_cameras import words_moved
 from clfractal.scene.movement import movement_of
 from clfractal.scene.tracks import target_of, value_under, with_values
-from clfractal.scene.words import words_moved
 from clfractal.schema.base import Section
-from clfractal.viewer.timeline import with_key
+from clfractal.viewer.timeline_edits import with_key
 
 Path: TypeAlias = tuple[str, ...]
 

@@ -6,18 +6,18 @@ from collections.abc import Generator, Iterable
 
 import numpy as np
 
+from clfractal.camera.views import camera_view
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.engine.job import Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.preview import Preview
+from clfractal.engine.run import Executor, Result, WorkItem
+from clfractal.engine.settle import is_settled, settled
 from clfractal.errors import ClfractalError, SceneError
-from clfractal.optics.view import camera_view
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Stereo
-from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.preview import Preview
-from clfractal.work.run import Executor, Result, WorkItem
-from clfractal.work.settle import is_settled, settled
 
 
 class Cancellable:

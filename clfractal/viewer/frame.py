@@ -6,11 +6,11 @@ import threading
 from dataclasses import dataclass
 
 from clfractal.device.select import Device
-from clfractal.renderers.plan import PlannedView
+from clfractal.engine.canvas import Canvas
+from clfractal.engine.job import Job
+from clfractal.engine.show import Arrangement, smoothing_of
+from clfractal.integrators.plan import PlannedView
 from clfractal.scene.model import Scene
-from clfractal.work.canvas import Canvas
-from clfractal.work.job import Job
-from clfractal.work.show import Arrangement, smoothing_of
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +29,7 @@ class Frame:
         finished: whether it has the bits of the shell's picture.
         seconds: that rendering took so far, without compiling.
         frame_seconds: that the last pass took.
-        smoothing: how strongly the noise of each view is smoothed when it is shown, see `clfractal.work.show`.
+        smoothing: how strongly the noise of each view is smoothed when it is shown, see `clfractal.engine.show`.
         stamp: the canvas's, while it holds this frame.
     """
 

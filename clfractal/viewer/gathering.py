@@ -5,15 +5,15 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 
-from clfractal.pictures.tiles import Region
-from clfractal.renderers.plan import PlannedView
+from clfractal.engine.canvas import Canvas
+from clfractal.engine.job import Job
+from clfractal.engine.refine import pass_ranges
+from clfractal.engine.show import Arrangement, smoothing_of
+from clfractal.images.tiles import Region
+from clfractal.integrators.plan import PlannedView
 from clfractal.viewer.frame import Growth
 from clfractal.viewer.pacing import Schedule
 from clfractal.viewer.preparing import Wanted
-from clfractal.work.canvas import Canvas
-from clfractal.work.job import Job
-from clfractal.work.refine import pass_ranges
-from clfractal.work.show import Arrangement, smoothing_of
 
 
 class Gathering:

@@ -13,7 +13,7 @@ from math import hypot, isfinite, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import View
+from clfractal.camera.views import View
 from clfractal.scene.lighting import DirectionalLight, PlacedLight, SetLight
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST

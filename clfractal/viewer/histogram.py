@@ -8,12 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.background import Tell
-from clfractal.work.local import LocalExecutor
 
 BINS = 96
 _RESOLUTION = 64
@@ -71,8 +71,8 @@ class HistogramTask:
 
 
 def _filled(scene: Scene, executor: LocalExecutor, token: CancelToken, tell: Tell) -> Histogram:
+    from clfractal.engine.prepare import prepare
     from clfractal.voxels.fill import fill_grid
-    from clfractal.work.prepare import prepare
 
     settings = scene.renderer
     assert isinstance(settings, VolumeRenderer)

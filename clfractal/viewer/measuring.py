@@ -7,11 +7,11 @@ from contextlib import suppress
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.structs import Precision
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError, Stopped
-from clfractal.renderers.lanes import is_measured, march_reports
-from clfractal.viewer.options import Options
+from clfractal.integrators.lanes import is_measured, march_reports
 from clfractal.viewer.studio import Studio
-from clfractal.work.local import LocalExecutor
+from clfractal.viewer.window_options import Options
 
 REST_SECONDS = 2.0
 """For so long a window has been at rest before its device is measured."""

@@ -11,7 +11,7 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import View, camera_view
+from clfractal.camera.views import View, camera_view
 from clfractal.scene.parts import AnyCamera, OrthographicCamera
 from clfractal.viewer.pointer import Size, point_at, project, ray_at
 from clfractal.viewer.pose import C, Style, pose_of, rotation, stood, turned_about, turning

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import View
+from clfractal.camera.views import View
 from clfractal.viewer.pointer import Floats, Size
 
 # The near plane, part of the distance from the eye to the view's plane.

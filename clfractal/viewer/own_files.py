@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from clfractal import resources
+from clfractal.files import resources
 
 _OWN_FOLDERS = ("scenes", "environments", "formulas/library", "kernels")
 

@@ -7,12 +7,12 @@ from contextlib import contextmanager
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.renderers.resources import Borrowing, Kept
+from clfractal.engine.canvas import Canvas, CanvasKernels, CanvasStore
+from clfractal.engine.job import Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import Progress, run
+from clfractal.integrators.kept import Borrowing, Kept
 from clfractal.viewer.frame import CanvasPool, Frame
-from clfractal.work.canvas import Canvas, CanvasKernels, CanvasStore
-from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import Progress, run
 
 BUDGET_SECONDS = 0.02
 """Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""

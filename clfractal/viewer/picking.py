@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from clfractal.optics.view import View
-from clfractal.pictures.modes import eye_at
-from clfractal.pictures.tiled import Floats
-from clfractal.renderers.plan import PlannedView
+from clfractal.camera.views import View
+from clfractal.images.modes import eye_at
+from clfractal.images.tiled import Floats
+from clfractal.integrators.plan import PlannedView
 from clfractal.viewer.display import Shown
 
 

@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
-from clfractal.renderers import points
+from clfractal.integrators import points
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.background import Tell
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.pointer import ray_at
 from clfractal.viewer.studio import Studio
-from clfractal.work.local import LocalExecutor
 
 Point = tuple[float, float, float]
 

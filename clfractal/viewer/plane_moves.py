@@ -12,9 +12,9 @@ from math import atan2, degrees, isfinite
 import numpy as np
 from pydantic import ValidationError
 
+from clfractal.camera.views import plane_view
 from clfractal.errors import SceneError
-from clfractal.optics.view import plane_view
-from clfractal.scene.plane import Axis, Placed, Plane, Transform, moved, rotated, scaled
+from clfractal.scene.rectangle import Axis, Placed, Plane, Transform, moved, rotated, scaled
 from clfractal.viewer.pointer import Size
 
 # A plane with more steps than this is written by its middle and normal instead: pointers make a step a frame.

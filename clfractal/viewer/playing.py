@@ -5,10 +5,11 @@ from __future__ import annotations
 from clfractal.errors import ClfractalError
 from clfractal.scene.animation import MAX_FRAMES, Animation
 from clfractal.scene.parts import AnyCamera
-from clfractal.viewer import film_place, timeline
+from clfractal.viewer import film_place
+from clfractal.viewer import timeline_edits as timeline
+from clfractal.viewer.number_words import counted
 from clfractal.viewer.studio import Studio
 from clfractal.viewer.thinning import Sample, flight
-from clfractal.viewer.words import counted
 
 _CAMERA = ("position", "target", "up")
 

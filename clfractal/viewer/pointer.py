@@ -11,7 +11,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import View
+from clfractal.camera.views import View
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Size: TypeAlias = tuple[int, int]

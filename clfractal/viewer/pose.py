@@ -8,8 +8,8 @@ from typing import Literal, TypeAlias, TypeVar, cast
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.camera.views import camera_view
 from clfractal.errors import SceneError
-from clfractal.optics.view import camera_view
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST, NEAREST
 from clfractal.viewer.pointer import Floats

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from clfractal.device.cancel import CancelToken
 from clfractal.errors import ClfractalError, DeviceError, Stopped
-from clfractal.renderers.resources import Kept
+from clfractal.integrators.kept import Kept
 from clfractal.scene.model import Scene
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.kept_view import cameras_of, with_cameras

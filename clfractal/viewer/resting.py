@@ -7,18 +7,18 @@ from collections.abc import Callable
 import numpy as np
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.canvas import Canvas
+from clfractal.engine.finish import darkness_is_certain
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare
+from clfractal.engine.run import run
 from clfractal.files.channels import ALBEDO, NORMAL
-from clfractal.pictures.denoise import check_installed, denoised
-from clfractal.pictures.film import Film
-from clfractal.pictures.tiled import Floats
+from clfractal.images.denoise import check_installed, denoised
+from clfractal.images.film import Film
+from clfractal.images.tiled import Floats
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.work.canvas import Canvas
-from clfractal.work.films import JobFilms
-from clfractal.work.finish import darkness_is_certain
-from clfractal.work.local import LocalExecutor
-from clfractal.work.prepare import prepare
-from clfractal.work.run import run
 
 GUIDE_SAMPLES = 4
 """Samples of what surfaces reflect and of their normals, which the filter is told; it knows that they are noisy, too."""

@@ -10,7 +10,7 @@ from clfractal.errors import ClfractalError
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
-from clfractal.scene.plane import Plane
+from clfractal.scene.rectangle import Plane
 from clfractal.scene.stereo import Mode
 from clfractal.schema.base import Vector
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box

@@ -12,8 +12,13 @@ from functools import partial
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.engine.canvas import CHANNELS, Canvas
+from clfractal.engine.job import Job
+from clfractal.engine.prepare import prepare
+from clfractal.engine.refine import has_room
+from clfractal.engine.run import Progress
 from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, NotReady, Stopped
-from clfractal.renderers.resources import Borrowing, Kept
+from clfractal.integrators.kept import Borrowing, Kept
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Task, do_some
 from clfractal.viewer.drafts import Drafts
@@ -32,11 +37,6 @@ from clfractal.viewer.preparing import (
     shows_whole,
 )
 from clfractal.viewer.resting import clean
-from clfractal.work.canvas import CHANNELS, Canvas
-from clfractal.work.job import Job
-from clfractal.work.prepare import prepare
-from clfractal.work.refine import has_room
-from clfractal.work.run import Progress
 
 SETTLE_SECONDS = 0.15
 """A picture that moves is not refined before nothing has come for so long."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
-from clfractal.arguments import shown
 from clfractal.errors import ClfractalError, Where, unknown_name
+from clfractal.errors.arguments import shown
 from clfractal.files.atomic import atomic_writer, file_error
 from clfractal.files.document import read_document, read_text_file, write_document
 from clfractal.files.marks import Document

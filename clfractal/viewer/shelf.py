@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
+from clfractal.engine import thumbnails
+from clfractal.engine.thumbnails import Pixels
 from clfractal.errors import ClfractalError
 from clfractal.scene.load import load_scene, read_text
 from clfractal.scene.model import Scene
-from clfractal.work import thumbnails
-from clfractal.work.thumbnails import Pixels
 
 
 @dataclass(slots=True, eq=False)

@@ -11,8 +11,8 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.optics.view import View, scene_view
-from clfractal.renderers.plan import PlannedView
+from clfractal.camera.views import View, scene_view
+from clfractal.integrators.plan import PlannedView
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import Extent
 from clfractal.viewer.display import Shown

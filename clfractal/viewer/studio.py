@@ -14,14 +14,15 @@ from pathlib import Path
 from typing import Any
 
 from clfractal.device.select import Device
+from clfractal.engine.show import Look
 from clfractal.errors import ClfractalError
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
 from clfractal.viewer.editing import edited, value_at
+from clfractal.viewer.film_queue import FilmQueue
 from clfractal.viewer.filming import MOVING_SECONDS, InFilm
-from clfractal.viewer.films import FilmQueue
 from clfractal.viewer.formula_texts import FormulaTexts
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.history import History, Kind
@@ -31,7 +32,6 @@ from clfractal.viewer.session import Session
 from clfractal.viewer.shared import Group, Shared
 from clfractal.viewer.tracked import TrackedError, check_tracked
 from clfractal.viewer.viewport import image_of, render_key
-from clfractal.work.show import Look
 
 Camera = PerspectiveCamera | OrthographicCamera
 MESSAGE_SECONDS = 6.0

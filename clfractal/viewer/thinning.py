@@ -13,7 +13,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.movement import Movement
 from clfractal.scene.parts import AnyCamera
 from clfractal.schema.base import Vector
-from clfractal.viewer.timeline import NEAR
+from clfractal.viewer.timeline_edits import NEAR
 
 TOLERANCE = 0.01
 """How far a thinned flight may be beside the recorded one: parts of the camera's distance from its target."""

@@ -11,9 +11,9 @@ from clfractal.errors import ClfractalError
 from clfractal.scene.animation import Animation
 from clfractal.scene.curves import Values
 from clfractal.scene.movement import movement_of
-from clfractal.viewer import timeline
+from clfractal.viewer import timeline_edits as timeline
 from clfractal.viewer.filming import InFilm
-from clfractal.viewer.timeline import NONE, Selection
+from clfractal.viewer.timeline_edits import NONE, Selection
 
 _MARGINS = 0.05, 0.02
 """Parts of a film that are shown before its first frame, where curves have the words of their lines, and after its last."""

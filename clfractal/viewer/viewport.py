@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clfractal.pictures.modes import BELOW, BESIDE
+from clfractal.images.modes import BELOW, BESIDE
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Output
 from clfractal.scene.stereo import APART, Mode, Stereo

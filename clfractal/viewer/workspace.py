@@ -18,21 +18,21 @@ from clfractal.viewer.aim import Aim, aimed
 from clfractal.viewer.begin import Begun
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.motion import Motion
-from clfractal.viewer.outputs import Outputs
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.picking import Pick
-from clfractal.viewer.places import Places, places_of
 from clfractal.viewer.playing import Player
 from clfractal.viewer.recording import Event
+from clfractal.viewer.screens import Outputs
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.speed import Meter
 from clfractal.viewer.studio import Studio
-from clfractal.viewer.surface import Surface
 from clfractal.viewer.ui_renderer import UiRenderer
 from clfractal.viewer.viewport import image_of
 from clfractal.viewer.window import Window
+from clfractal.viewer.window_picture import Surface
+from clfractal.viewer.window_places import Places, places_of
 
 
 class Workspace(ABC):

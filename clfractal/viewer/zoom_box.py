@@ -12,8 +12,8 @@ from math import isfinite
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.camera.views import View
 from clfractal.errors import SceneError, Where
-from clfractal.optics.view import View
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import Box, VolumeRenderer, Zoom

@@ -14,11 +14,11 @@ from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels import programs
+from clfractal.voxels.brick_store import extent_buffer
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import BRICK, bricks_of, pack_places
 from clfractal.voxels.octree import empty_cubes
 from clfractal.voxels.pool import allocate, plan_pools
-from clfractal.voxels.store import extent_buffer
 
 # Bytes of the array that are on the device at a time, beside the grid.
 SLAB_BYTES = 1 << 28

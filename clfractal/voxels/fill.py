@@ -16,15 +16,15 @@ from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
+from clfractal.geometry.solids import Body
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.solids import Body
 from clfractal.voxels import programs
+from clfractal.voxels.brick_store import Evaluated, store
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import Lattice, Places, all_places, lattice_of, unpack_places
 from clfractal.voxels.octree import EMPTY, FULL, Descent, descend
-from clfractal.voxels.store import Evaluated, store
 
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
 SLOW_APPLICATIONS = 1e7

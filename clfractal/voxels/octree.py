@@ -16,7 +16,7 @@ FIRST_LEVEL = 3
 # The octants of directions in which z, y or x falls, a bit each.
 FALLING = (np.uint8(0xF0), np.uint8(0xCC), np.uint8(0xAA))
 MOST_SIDE = 7
-# As in `kernels/voxels_nodes.cl`.
+# As in `kernels/voxels/voxels_nodes.cl`.
 UNDECIDED, EMPTY, FULL = 0, 1, 2
 
 

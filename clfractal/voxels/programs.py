@@ -17,8 +17,8 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
+from clfractal.geometry.solids import Body
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.solids import Body
 from clfractal.voxels.grid import Kind
 from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE
 
@@ -29,9 +29,9 @@ ALL_OUTSIDE, ALL_INSIDE = -1, -2
 FILL_KINDS = ("inside", "coverage", "iterations")
 # Of each of them the entry point and the kernel.
 _FILLS = (
-    ("voxels_fill.cl", "fill_bricks"),
-    ("voxels_cover.cl", "cover_bricks"),
-    ("voxels_counts.cl", "count_bricks"),
+    ("voxels/voxels_fill.cl", "fill_bricks"),
+    ("voxels/voxels_cover.cl", "cover_bricks"),
+    ("voxels/voxels_counts.cl", "count_bricks"),
 )
 NORMALS = ("gradient", "least_squares", "exact")
 SOURCES: tuple[Source, ...] = ("bits", "bricks", "slab")
@@ -41,7 +41,7 @@ BRICK_GROUP = (1, 16)
 # Where a work-item takes 9 places of a brick, one x and one y: 81 of them, in whole groups.
 ALONE_ITEMS, ALONE_GROUP = 96, (32, 1)
 NODE_POINTS = 64
-# Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels.h`.
+# Packets of a work-item side by side, where packets have lanes: as in `kernels/voxels/voxels.h`.
 PACKETS = 2
 
 _BUFFER = Argument("buffer", 8192)
@@ -139,7 +139,7 @@ def program_text(recipe: Recipe) -> FlatText:
 def nodes_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
     """`classify_nodes`: which nodes of the octree are outside or inside as a whole."""
     return Recipe(
-        "voxels_nodes.cl",
+        "voxels/voxels_nodes.cl",
         "classify_nodes",
         _number_defines(lanes, precision),
         precision,
@@ -167,7 +167,7 @@ def fill_recipe(body: Body, renderer: VolumeRenderer, lanes: int, precision: Pre
 def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Recipe:
     """`classify_bricks`: which bricks are outside or inside as a whole; `alone`: see `store_recipe`."""
     return Recipe(
-        "voxels_classes.cl",
+        "voxels/voxels_classes.cl",
         "classify_bricks",
         {**_source_defines(source, sample, alone), "RADIUS": 0},
         "float32",
@@ -181,7 +181,7 @@ def classify_recipe(source: Source, sample: Kind, *, alone: bool = False) -> Rec
 def store_recipe(source: Source, sample: Kind, radius: int, *, alone: bool = False) -> Recipe:
     """`store_bricks`: samples and gradient normals of stored bricks.
 
-    `alone`: a work-item takes one x and one y of a brick, for GPUs (`kernels/voxels_alone.h`); else a brick.
+    `alone`: a work-item takes one x and one y of a brick, for GPUs (`voxels_alone.h`); else a brick.
     """
     items, group = (ALONE_ITEMS, ALONE_GROUP) if alone else (1, BRICK_GROUP)
     defines = {
@@ -189,25 +189,25 @@ def store_recipe(source: Source, sample: Kind, radius: int, *, alone: bool = Fal
         "RADIUS": radius,
     }
     arguments = (*[_BUFFER] * 3, _INT, _INT, _INT, *[_BUFFER] * 3)
-    return Recipe("voxels_bricks.cl", "store_bricks", defines, "float32", {}, items, group, arguments)
+    return Recipe("voxels/voxels_bricks.cl", "store_bricks", defines, "float32", {}, items, group, arguments)
 
 
 def blocks_recipe() -> Recipe:
     """`seen_blocks`: which parts of stored bricks may be seen."""
     arguments = (_BUFFER, _BUFFER, *[_INT] * 4, _FLOAT)
-    return Recipe("voxels_blocks.cl", "seen_blocks", {}, "float32", {}, 1, BRICK_GROUP, arguments)
+    return Recipe("voxels/voxels_blocks.cl", "seen_blocks", {}, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
 def ranges_recipe() -> Recipe:
     """`brick_ranges`: the least and the largest sample of stored bricks."""
     arguments = (_BUFFER, _BUFFER, *[_INT] * 4)
-    return Recipe("voxels_blocks.cl", "brick_ranges", {}, "float32", {}, 1, BRICK_GROUP, arguments)
+    return Recipe("voxels/voxels_blocks.cl", "brick_ranges", {}, "float32", {}, 1, BRICK_GROUP, arguments)
 
 
 def normals_recipe(body: Body, lanes: int, precision: Precision) -> Recipe:
     """`refine_normals`: normals of samples at the surface by `least_squares` or `exact`."""
     return Recipe(
-        "voxels_normals.cl",
+        "voxels/voxels_normals.cl",
         "refine_normals",
         _number_defines(lanes, precision),
         precision,

@@ -18,16 +18,16 @@ import pytest
 import clfractal
 from clfractal.cluster import dispatch, tasks
 from clfractal.cluster.cluster import Cluster
+from clfractal.cluster.cluster_engine import ClusterEngine
 from clfractal.cluster.dispatch import Dispatcher, Work
-from clfractal.cluster.engine import ClusterEngine
 from clfractal.cluster.link import Link, Member, usual_key
 from clfractal.cluster.message import Message
 from clfractal.device.select import DeviceInfo
+from clfractal.engine.engine import Engine
+from clfractal.engine.job import Job
+from clfractal.engine.run import Counters, WorkItem
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
-from clfractal.pictures.tiles import TILE
-from clfractal.work.engine import Engine
-from clfractal.work.job import Job
-from clfractal.work.run import Counters, WorkItem
+from clfractal.images.tiles import TILE
 from tests.shell import SCENE
 
 

@@ -228,7 +228,7 @@ def _other_program(where: Path) -> None:
     for name in ("clfractal", "kernels", "scenes"):
         if (home / name).exists():
             shutil.copytree(home / name, where / name, ignore=shutil.ignore_patterns("__pycache__", "*.exr"))
-    home = where / "clfractal/resources.py"
+    home = where / "clfractal/files/resources.py"
     home.write_text(home.read_text().replace(f'"{clfractal.__version__}"', '"9.9.9"'))
 
 

@@ -22,9 +22,9 @@ import pytest
 
 from clfractal.device import cache, drivers_folder, isolate, tune
 from clfractal.device.select import Device, choose, is_pocl
+from clfractal.engine import thumbnails
 from clfractal.errors import CacheWarning, DeviceError, FileError, UntriedError
-from clfractal.renderers import lanes
-from clfractal.work import thumbnails
+from clfractal.integrators import lanes
 from tests.interrupts import planes
 from tests.shell import SCENE, Ended, command, environment, process
 

@@ -22,8 +22,8 @@ from clfractal.device.compiler import Warm
 from clfractal.device.program import math_flags
 from clfractal.device.select import Device, by_key, is_pocl
 from clfractal.device.source import flatten
-from clfractal.renderers.lanes import best_lanes
-from clfractal.resources import folder as resources
+from clfractal.files.resources import folder as resources
+from clfractal.integrators.lanes import best_lanes
 from clfractal.voxels import programs
 from clfractal.voxels.lattice import EXTENT
 from tests.shell import environment
@@ -156,7 +156,7 @@ def test_the_machine_code_calls_nothing_small(
 
 
 def test_the_texts_name_nothing_small_that_is_no_operation(rendered: Path) -> None:
-    direct = (resources("kernels") / "direct.h").read_text(encoding="utf-8")
+    direct = (resources("kernels") / "device/direct.h").read_text(encoding="utf-8")
     defined = set(re.findall(r"#define (\w+)\(", direct))
     texts = [path.read_text(encoding="utf-8") for path in rendered.glob("*.cl")]
     assert len(texts) >= len(KERNELS)

@@ -16,7 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.errors import FileError
-from clfractal.files.environment import BRIGHTEST, read_environment
+from clfractal.files.environment_map import BRIGHTEST, read_environment
 from clfractal.files.exr import write_exr
 
 Pixels = npt.NDArray[Any]

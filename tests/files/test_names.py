@@ -11,7 +11,7 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.errors import FileError
-from clfractal.files.environment import read_environment
+from clfractal.files.environment_map import read_environment
 from clfractal.files.exr import library_name, read_exr, write_exr
 from clfractal.files.exr_header import read_header
 from clfractal.files.texture import read_texture

@@ -18,7 +18,7 @@ import pytest
 import SimpleITK
 
 from clfractal.files import voxel_data
-from clfractal.files.volume import read_volume
+from clfractal.files.volume_file import read_volume
 from clfractal.scene.model import Scene
 from tests.scenes import scene_of
 

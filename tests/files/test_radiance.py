@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.errors import FileError
-from clfractal.files.environment import read_environment
+from clfractal.files.environment_map import read_environment
 
 Pixels = npt.NDArray[Any]
 

@@ -9,10 +9,10 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.files import tone
-from clfractal.files.curves import TONES, Tone
 from clfractal.files.srgb import encode8, encode16
 from clfractal.files.tone import LUMINANCE, MIDDLE, WHITE, toned
-from clfractal.pictures.develop import Development
+from clfractal.files.tone_names import TONES, Tone
+from clfractal.images.develop import Development
 from clfractal.scene.parts import Output
 
 CURVES: tuple[Tone, ...] = ("reinhard", "agx")

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from clfractal.errors import FileError
-from clfractal.files import volume as module
+from clfractal.files import volume_file as module
 from clfractal.files import voxel_data
-from clfractal.files.volume import SCENE_KEY, Volume, read_volume, write_slabs, write_volume
+from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_slabs, write_volume
 from tests.files.limits import file_size_limit, rewrite
 
 SCENE = 'version: 1\nformula: {name: hast}\nnote: "back\\\\slash, := and \\n"\n'

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import FileError
 from clfractal.files import nrrd
-from clfractal.files.volume import Volume, read_volume, write_volume
+from clfractal.files.volume_file import Volume, read_volume, write_volume
 from tests.files.limits import rewrite
 
 GOOD = {

@@ -11,9 +11,9 @@ import numpy.typing as npt
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
+from clfractal.files.resources import folder
 from clfractal.formulas.opencl import FormulaText
-from clfractal.renderers.declarations import struct_text
-from clfractal.resources import folder
+from clfractal.integrators.declarations import struct_text
 from tests.small_kernels import Floats, SmallKernels
 
 _DEFINED = re.compile(
@@ -22,12 +22,19 @@ _DEFINED = re.compile(
     re.MULTILINE,
 )
 _INCLUDES = re.compile(
-    r'^#include "(?:lanes|vectors|structs|formula|orbits?|solids|numbers/\w+)\.h"\n', re.MULTILINE
+    r'^#include "(?:[a-z]+/)*(?:lanes|vectors|structs|formula|orbits?|solids|numbers/\w+)\.h"\n', re.MULTILINE
 )
 
 HEAD = "".join(
     f'#include "{name}"\n'
-    for name in ("lanes.h", "numbers/real.h", "numbers/powers.h", "numbers/quick.h", "vectors.h", "structs.h")
+    for name in (
+        "device/lanes.h",
+        "formulas/numbers/real.h",
+        "formulas/numbers/powers.h",
+        "formulas/numbers/quick.h",
+        "device/vectors.h",
+        "structs.h",
+    )
 )
 
 

@@ -20,12 +20,12 @@ from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.files.channels import CHANNELS
 from clfractal.formulas import catalog
-from clfractal.pictures.tiles import Region
-from clfractal.renderers import surface
-from clfractal.renderers.plan import Plan
-from clfractal.renderers.points import program_text
+from clfractal.geometry.solids import Body
+from clfractal.images.tiles import Region
+from clfractal.integrators import surface
+from clfractal.integrators.plan import Plan
+from clfractal.integrators.points import program_text
 from clfractal.scene.load import load_scene
-from clfractal.solids import Body
 from tests.devices import device
 from tests.formulas.opencl_batch import kernel_file, numbered
 
@@ -53,7 +53,7 @@ def surface_texts(name: str, precision: Precision, lanes: int, coloring: str = "
 
 def whole_text(name: str, precision: Precision, lanes: int) -> str:
     """The march and, behind it, what the program for lists of points has of its own."""
-    own = '#line 1 "kernels/points.cl"\n' + kernel_file("points.cl")
+    own = '#line 1 "kernels/formulas/points.cl"\n' + kernel_file("formulas/points.cl")
     assert "__kernel void escape_counts" in own
     return surface_texts(name, precision, lanes)[0] + own
 

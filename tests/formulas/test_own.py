@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.commands.formulas import list_formulas, tell_formula
+from clfractal.cli.list_formulas import list_formulas, tell_formula
 from clfractal.errors import ClfractalError
 from clfractal.formulas import catalog
 from clfractal.scene.load import dump_scene, load_scene

@@ -12,9 +12,9 @@ from clfractal.device.select import choose
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.formulas.together import write_together
-from clfractal.renderers.points import distances, nearest
+from clfractal.geometry.solids import Body
+from clfractal.integrators.points import distances, nearest
 from clfractal.scene.load import load_scene
-from clfractal.solids import Body
 
 # Of three and four numbers, with scalar rules and without, a chain, and a shape: (the formula, applications).
 KINDS = {

@@ -10,9 +10,9 @@ from clfractal.device.source import FlatText
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import points, surface, trial
+from clfractal.geometry.solids import Body
+from clfractal.integrators import points, surface, trial
 from clfractal.scene.load import load_scene
-from clfractal.solids import Body
 from tests.features import APART, FEATURES, OF_MEDIA, put_together
 from tests.gpu.pairs import covering
 from tests.platforms import programs

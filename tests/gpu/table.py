@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from clfractal.formulas import catalog
-from clfractal.renderers.lanes import rule_of
+from clfractal.integrators.lanes import rule_of
 from tests.gpu.figures import GPUS, Figures, Gpu
 from tests.gpu.record import Measured
 

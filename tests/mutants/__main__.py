@@ -2,7 +2,7 @@
 
     python -m tests.mutants                            60 mistakes, chosen by the seed 1
     python -m tests.mutants --sample 20 --seed 7
-    python -m tests.mutants --only 'kernels/queue.h'   mistakes of some files only
+    python -m tests.mutants --only 'kernels/integrators/march/queue.h'   mistakes of some files only
     python -m tests.mutants --sample 5 --list          shows them without running a test
 
 Run it in a checkout. Each survivor is printed with its change: it wants a test, or it changes nothing (say so where you

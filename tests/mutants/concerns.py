@@ -11,92 +11,92 @@ from pathlib import Path
 # The first row whose pattern fits a file names its tests, in the order in which they are asked: cheap ones first, without
 # `tests/`, `test_` and `.py`. To them come the tests that bear the file's name, and for Python those that import it.
 CONCERNS = """
-kernels/numbers/*: numbers/ formulas/distance render/surface_analytic
-kernels/show*: work/show work/smoothing viewer/display
-kernels/canvas.cl: work/canvas viewer/session
-kernels/cut_plane.cl: render/cut_plane render/cut_plane_periods
-kernels/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
+kernels/formulas/numbers/*: numbers/ formulas/distance render/surface_analytic
+kernels/*/show*: engine/show engine/smoothing viewer/display
+kernels/images/canvas.cl: engine/canvas viewer/session
+kernels/integrators/cut_plane.cl: render/cut_plane render/cut_plane_periods
+kernels/*/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
 kernels/*planes*: render/planes_in_picture render/planes_in_fog
-kernels/environment.h: render/environment_kernel render/surface_rays
-kernels/sun.h: render/sun
-kernels/normals.h: render/normals render/normals_properties render/pixel_points
-kernels/pixel_points.h: render/pixel_points render/normals render/normals_properties
-kernels/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog
-kernels/color[_i]*: render/coloring render/surface_light
-kernels/color.h: render/coloring render/cut_plane render/surface_samples
-kernels/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
-kernels/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
-kernels/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
-kernels/secondary.h: render/surface_rays render/surface_light
-kernels/wide_lights.h: render/surface_rays render/surface_light render/light_shapes
-kernels/queue.h: render/surface_rays render/pixel_points
-kernels/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
-kernels/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
-kernels/st[ao]*: render/surface_rays render/pixel_points render/surface_light
-kernels/surface*: render/surface_light render/surface_rays render/pixel_points
-kernels/objects.h: render/objects render/objects_light
-kernels/shape*: render/objects render/joined render/emitter_places
+kernels/shading/environment.h: render/environment_kernel render/surface_rays
+kernels/shading/sun.h: render/sun
+kernels/integrators/march/normals.h: render/normals render/normals_properties render/pixel_points
+kernels/integrators/march/pixel_points.h: render/pixel_points render/normals render/normals_properties
+kernels/integrators/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog
+kernels/*/color[_i]*: render/coloring render/surface_light
+kernels/shading/color.h: render/coloring render/cut_plane render/surface_samples
+kernels/integrators/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
+kernels/integrators/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
+kernels/*/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
+kernels/integrators/secondary.h: render/surface_rays render/surface_light
+kernels/integrators/wide_lights.h: render/surface_rays render/surface_light render/light_shapes
+kernels/integrators/march/queue.h: render/surface_rays render/pixel_points
+kernels/integrators/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
+kernels/integrators/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
+kernels/*/st[ao]*: render/surface_rays render/pixel_points render/surface_light
+kernels/*/surface*: render/surface_light render/surface_rays render/pixel_points
+kernels/geometry/objects.h: render/objects render/objects_light
+kernels/*/shape*: render/objects render/joined render/emitter_places
 kernels/elements/shapes/*: render/objects render/joined render/emitter_places
-kernels/object_grids.h: render/object_grids render/turned_grids
-kernels/clouds.h: render/clouds
-kernels/medium_event.h: render/clouds render/volume_paths
-kernels/volume_bounds.h: render/volume_paths
-clfractal/renderers/transfer.py: render/clouds render/volume_paths voxels/blocks
-kernels/emitter*.h: render/emitter_places render/emitters
-kernels/rectangles.h: render/rectangles render/emitter_places render/light_shapes
-kernels/light_asks.h: render/emitters render/light_shapes render/paths
-kernels/media.h: render/glass_objects
-kernels/glass_paths.h: render/glass_paths render/glass_objects
-kernels/participating_media.h: render/participating_media
-kernels/bump.h: render/bump
-kernels/bsdf_bumped.h: render/bumped_materials
-kernels/events.h: render/clouds render/paths render/subsurface
-kernels/water.h: render/objects
-kernels/look.h: render/objects_light render/surface_light
-kernels/march_steps.h: render/searches
-kernels/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
-kernels/solids*: render/joined
-kernels/solid_inside.h: voxels/
-kernels/node_proof.h: voxels/
-kernels/bricks.h: voxels/
-clfractal/solids.py: voxels/joined_voxels render/joined
-kernels/trap*: render/coloring render/joined
-kernels/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
-kernels/p[ar]*: render/surface_samples render/passes device/tune
-kernels/pixel.h: render/surface_samples render/passes render/surface_light
-kernels/points.cl: render/points formulas/counts
-kernels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
-kernels/gather.h: render/volume_rays render/volume_surface
-kernels/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits render/turned_grids
-kernels/voxels*: voxels/ render/volume_surface render/turned_grids
-kernels/tiles.h: render/tiles_bits render/surface_samples
+kernels/geometry/object_grids.h: render/object_grids render/turned_grids
+kernels/geometry/clouds.h: render/clouds
+kernels/shading/medium_event.h: render/clouds render/volume_paths
+kernels/integrators/volume/volume_bounds.h: render/volume_paths
+clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/blocks
+kernels/*/emitter*.h: render/emitter_places render/emitters
+kernels/geometry/rectangles.h: render/rectangles render/emitter_places render/light_shapes
+kernels/shading/light_asks.h: render/emitters render/light_shapes render/paths
+kernels/shading/media.h: render/glass_objects
+kernels/integrators/glass_paths.h: render/glass_paths render/glass_objects
+kernels/shading/participating_media.h: render/participating_media
+kernels/shading/bump.h: render/bump
+kernels/shading/bsdf_bumped.h: render/bumped_materials
+kernels/integrators/events.h: render/clouds render/paths render/subsurface
+kernels/geometry/water.h: render/objects
+kernels/shading/look.h: render/objects_light render/surface_light
+kernels/integrators/march/march_steps.h: render/searches
+kernels/*/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
+kernels/*/solids*: render/joined
+kernels/formulas/solid_inside.h: voxels/
+kernels/formulas/node_proof.h: voxels/
+kernels/voxels/bricks.h: voxels/
+clfractal/geometry/solids.py: voxels/joined_voxels render/joined
+kernels/*/trap*: render/coloring render/joined
+kernels/*/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
+kernels/*/p[ar]*: render/surface_samples render/passes device/tune
+kernels/integrators/pixel.h: render/surface_samples render/passes render/surface_light
+kernels/formulas/points.cl: render/points formulas/counts
+kernels/voxels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
+kernels/device/gather.h: render/volume_rays render/volume_surface
+kernels/*/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits render/turned_grids
+kernels/*/voxels*: voxels/ render/volume_surface render/turned_grids
+kernels/integrators/tiles.h: render/tiles_bits render/surface_samples
 kernels/*: numbers/ render/surface_analytic render/surface_light
-clfractal/commands/*: cli bad_input exchange stereo_shell
-clfractal/api.py: api stereo_python work/engine
-clfractal/device/c[ah]*: device/isolate device/cache work/cancel
-clfractal/device/*: device/ work/cancel
+clfractal/cli/*: cli bad_input exchange stereo_shell
+clfractal/api.py: api stereo_python engine/engine
+clfractal/device/c[ah]*: device/isolate device/cache engine/cancel
+clfractal/device/*: device/ engine/cancel
 clfractal/files/*: files/
 clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/catalog
-clfractal/optics/*: render/view render/stereo_views render/surface_analytic
-clfractal/pictures/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
-clfractal/renderers/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
+clfractal/camera/*: render/view render/stereo_views render/surface_analytic
+clfractal/images/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
+clfractal/integrators/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
 clfractal/scene/grid_place.py: render/turned_grids
 clfractal/scene/given.py: render/turned_grids scene/volume_scenes
 clfractal/scene/palette.py: scene/ bad_input render/planes_in_picture
 clfractal/scene/*: scene/ bad_input
 clfractal/voxels/*: voxels/ render/volume_rays render/volume_bits
-clfractal/work/var*: work/variations vary_shell
-clfractal/work/*: work/ render/passes resume comfort
+clfractal/engine/var*: engine/variations vary_shell
+clfractal/engine/*: engine/ render/passes resume comfort
 clfractal/viewer/panels/*: viewer/panels viewer/widgets viewer/formula_panels viewer/golden_panels
 clfractal/viewer/app.py: window/
 clfractal/viewer/workspace.py: window/
 clfractal/viewer/window.py: window/
 clfractal/viewer/gl.py: window/
-clfractal/viewer/surface.py: window/
+clfractal/viewer/window_picture.py: window/
 clfractal/viewer/begin.py: window/
-clfractal/viewer/inputs.py: window/
+clfractal/viewer/input_events.py: window/
 clfractal/viewer/ui_renderer.py: window/
-clfractal/viewer/outputs.py: window/
+clfractal/viewer/screens.py: window/
 clfractal/viewer/operators.py: window/
 clfractal/viewer/motion.py: window/
 clfractal/viewer/*: viewer/studio viewer/session viewer/controls

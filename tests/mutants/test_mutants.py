@@ -25,7 +25,7 @@ needs_cosmic_ray = pytest.mark.skipif(
 
 KERNEL = """\
 // A comment with a + b, fmin(a, b) and 3.
-#include "lanes.h"
+#include "device/lanes.h"
 #define SHARE R(0.5)   // of a + b
 INLINE real twice(real a, __global const float *b) {
     real sum = a * R(2.0) - -b[1];
@@ -99,7 +99,7 @@ def test_every_file_has_tests_that_are_there() -> None:
         missing = [test for test in tests if not (CHECKOUT / test).exists()]
         assert not missing, (name, missing)
     assert concerned("clfractal/files/nrrd.py", CHECKOUT)[0].startswith("tests/files")
-    assert concerned("kernels/queue.h", CHECKOUT)[0] == "tests/render/test_surface_rays.py"
+    assert concerned("kernels/integrators/march/queue.h", CHECKOUT)[0] == "tests/render/test_surface_rays.py"
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="ends pytest by its process group")
@@ -112,7 +112,7 @@ def test_a_mistake_is_noticed_by_a_test_that_passes_without_it(tmp_path: Path) -
     for name in ("README.md", "CHANGELOG.md", "pyproject.toml", "Makefile"):
         (checkout / name).write_text("")
     (checkout / "clfractal" / "__init__.py").write_text("")
-    for name in ("errors", "resources"):
+    for name in ("errors", "lone"):
         (checkout / "clfractal" / f"{name}.py").write_text(before)
     for name in ("cli", "api"):
         (checkout / "tests" / f"test_{name}.py").write_text("def test_nothing():\n    pass\n")
@@ -124,7 +124,7 @@ def test_a_mistake_is_noticed_by_a_test_that_passes_without_it(tmp_path: Path) -
     trial = Trial(checkout, tmp_path / "trial", quick=False)
     noticed = trial.of(Mutant("clfractal/errors.py", "3", before, before.replace("2 * a", "3 * a")))
     assert (noticed.verdict, noticed.by) == ("killed", "tests/test_errors.py::test_twice")
-    missed = trial.of(Mutant("clfractal/resources.py", "1", before, before.replace("len", "bool")))
+    missed = trial.of(Mutant("clfractal/lone.py", "1", before, before.replace("len", "bool")))
     assert (missed.verdict, missed.by) == ("survived", "")
     assert "-    return 2 * a + 0 * len(str(a))" in missed.mutant.diff()
     for tree in (checkout, trial.tree):

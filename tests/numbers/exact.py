@@ -1,6 +1,6 @@
 """Exact values of operations at floats: mpmath numbers, or floats for infinities and NaN.
 
-They are total, as `kernels/numbers/real.h` says: where mathematics has no value there is a chosen one.
+They are total, as `real.h` says: where mathematics has no value there is a chosen one.
 """
 
 from __future__ import annotations

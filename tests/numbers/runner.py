@@ -12,10 +12,10 @@ from tests.numbers.arguments import Floats
 from tests.small_kernels import LOADS, SmallKernels
 
 _HEAD = """\
-#include "lanes.h"
-#include "numbers/real.h"
-#include "numbers/powers.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "formulas/numbers/powers.h"
+#include "device/vectors.h"
 
 """
 _DUALS = """\

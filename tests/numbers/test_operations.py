@@ -12,7 +12,7 @@ import pytest
 
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 from tests.devices import device, usable
 from tests.numbers.arguments import COUNT, Floats, arguments, partials
 from tests.numbers.comparison import Range, partial_fault, value_fault

@@ -7,20 +7,21 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
-from clfractal.device import peak, probe, struct_layout
+from clfractal.device import lane_probe as probe
+from clfractal.device import peak, struct_layout
 from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
+from clfractal.engine import canvas, show
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import cut_plane, points, surface, trial, volume
-from clfractal.renderers.declarations import STRUCTS
-from clfractal.renderers.plan import make_plan
+from clfractal.geometry.solids import Body
+from clfractal.integrators import cut_plane, points, surface, trial, volume
+from clfractal.integrators.declarations import STRUCTS
+from clfractal.integrators.plan import make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.solids import Body
 from clfractal.voxels import programs
-from clfractal.work import canvas, show
 from tests.portability.pictures import CHANNELS, SIZE, cases, scene_of
 
 Named = tuple[str, FlatText]

@@ -13,7 +13,7 @@ from functools import cache
 import pytest
 
 from clfractal.device.structs import Precision
-from clfractal.resources import folder
+from clfractal.files.resources import folder
 from tests.platforms import clang
 from tests.platforms.programs import EVERY_KIND, Named, every_text, of_formulas
 from tests.variants import every, one_of

@@ -79,7 +79,7 @@ def test_a_picture_is_rendered_written_and_resumed_without_posix(tmp_path: Path)
     (tmp_path / "scène.yaml").write_bytes(("\ufeff" + SCENE.replace("\n", "\r\n")).encode())
     text = """
 import numpy as np
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 from clfractal.cli import run
 from clfractal.files import system
 from clfractal.files.journal import Journal

@@ -19,15 +19,15 @@ import numpy.typing as npt
 
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
-from clfractal.pictures.film import Film
-from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.plan import PlannedView, make_plan
+from clfractal.engine.job import Identity, Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import run
+from clfractal.images.film import Film
+from clfractal.integrators.lanes import best_lanes
+from clfractal.integrators.plan import PlannedView, make_plan
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.work.job import Identity, Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import run
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 

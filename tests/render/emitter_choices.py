@@ -11,9 +11,9 @@ from scipy.stats import qmc
 
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
-from clfractal.renderers.declarations import struct_text
-from clfractal.renderers.objects import object_defines, object_records
-from clfractal.renderers.planes import CUT_PLANE
+from clfractal.geometry.objects import object_defines, object_records
+from clfractal.geometry.planes import CUT_PLANE
+from clfractal.integrators.declarations import struct_text
 from clfractal.scene.model import Scene
 from clfractal.schema.shape import Solid
 from tests.render.objects_oracle import NOWHERE
@@ -25,15 +25,15 @@ Hits = Callable[[Floats, Floats], Floats]
 """How far rays from origins in directions go to the solid; infinite where they do not meet it."""
 
 _TEXT = f"""\
-#include "lanes.h"
-#include "numbers/real.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "device/vectors.h"
 #include "structs.h"
-#include "camera.h"
-#include "sampling.h"
-#include "rectangles.h"
-#include "objects.h"
-#include "emitter_places.h"
+#include "integrators/camera.h"
+#include "integrators/sampling.h"
+#include "geometry/rectangles.h"
+#include "geometry/objects.h"
+#include "shading/emitter_places.h"
 {LOADS}
 // Planes of `count` numbers. In: u, v, choice. Out: the way to a place, the density of its choice, that of meeting it by
 // chance, and the object's weight.

@@ -1,4 +1,4 @@
-"""Runs every function of `kernels/environment.h` over packets of directions and of random numbers."""
+"""Runs every function of `environment.h` over packets of directions and of random numbers."""
 
 from __future__ import annotations
 
@@ -11,20 +11,20 @@ import pytest
 
 from clfractal.device.select import Device, choose, has_float64
 from clfractal.device.structs import Precision
-from clfractal.renderers import records
-from clfractal.renderers.declarations import struct_text
-from clfractal.renderers.environment import PackedEnvironment, material_fields
+from clfractal.integrators import records
+from clfractal.integrators.declarations import struct_text
 from clfractal.scene.lighting import Environment
+from clfractal.shading.environment import PackedEnvironment, material_fields
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = """\
-#include "lanes.h"
-#include "numbers/real.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "device/vectors.h"
 #include "structs.h"
-#include "shade.h"
-#include "sampling.h"
-#include "environment.h"
+#include "shading/shade.h"
+#include "integrators/sampling.h"
+#include "shading/environment.h"
 """
 _ENVIRONMENT = """\
 // Planes of `count` numbers. In: x, y, z, u, v. Out: red, green, blue, density; the sample's x, y, z, density.

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.pictures.compose import eye_regions
-from clfractal.pictures.film import Film
-from clfractal.pictures.modes import eye_size, picture_size
-from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiles import Region
+from clfractal.images.compose import eye_regions
+from clfractal.images.film import Film
+from clfractal.images.modes import eye_size, picture_size
+from clfractal.images.store import JournalFilm
+from clfractal.images.tiles import Region
 from clfractal.scene.stereo import Stereo
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X")

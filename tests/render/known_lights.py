@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from tests.render.shots import Floats, points_of
 
 PLACE = np.array([0.3, 0.2, 2.5])

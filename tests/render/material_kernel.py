@@ -1,4 +1,4 @@
-"""Runs the functions of `kernels/bsdf.h` on one material over packets of directions and of random numbers."""
+"""Runs the functions of `bsdf.h` on one material over packets of directions and of random numbers."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ import numpy as np
 
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
-from clfractal.renderers.glass import glass_tables
-from clfractal.renderers.materials import PBR, material_values, pbr_text, scattering_defines
-from clfractal.renderers.scattering import albedo_tables
 from clfractal.scene.materials import PbrMaterial
+from clfractal.shading.glass import glass_tables
+from clfractal.shading.materials import PBR, material_values, pbr_text, scattering_defines
+from clfractal.shading.scattering import albedo_tables
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = """\
-#include "lanes.h"
-#include "numbers/real.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "device/vectors.h"
 #include "structs.h"
-#include "sampling.h"
-#include "color.h"
-#include "bsdf.h"
-#include "bsdf_bumped.h"
+#include "integrators/sampling.h"
+#include "shading/color.h"
+#include "shading/bsdf.h"
+#include "shading/bsdf_bumped.h"
 
 """
 _SCATTER = """\

@@ -1,4 +1,4 @@
-"""Runs every function of `kernels/normals.h` over packets of pixels, each with its own points."""
+"""Runs every function of `normals.h` over packets of pixels, each with its own points."""
 
 from __future__ import annotations
 
@@ -15,9 +15,9 @@ from tests.small_kernels import LOADS, Floats, SmallKernels
 Masks = npt.NDArray[np.bool_]
 
 _TEXT = """\
-#include "lanes.h"
-#include "vectors.h"
-#include "normals.h"
+#include "device/lanes.h"
+#include "device/vectors.h"
+#include "integrators/march/normals.h"
 """
 _NORMALS = """\
 INLINE void store_normal(__global scalar *to, int pixels, vec normal, mask usable) {

@@ -9,7 +9,7 @@ import numpy as np
 from clfractal.elements.shapes.box import BoxObject
 from clfractal.elements.shapes.cylinder import CylinderObject
 from clfractal.elements.shapes.sphere import SphereObject
-from clfractal.renderers.water import wave_set
+from clfractal.geometry.water import wave_set
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import WaterObject
 from clfractal.schema.base import frame_of

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.pictures.film import Film
-from clfractal.renderers.cut_plane import renderer_of
+from clfractal.images.film import Film
+from clfractal.integrators.cut_plane import renderer_of
 from clfractal.scene.model import Scene
-from clfractal.scene.plane import Placed
+from clfractal.scene.rectangle import Placed
 from tests.scenes import scene_of
 
 Floats = npt.NDArray[np.float64]

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from clfractal.device.structs import Precision
 from clfractal.formulas.chain import Chain
-from clfractal.renderers import records
+from clfractal.integrators import records
 
 Floats = npt.NDArray[np.float64]
 

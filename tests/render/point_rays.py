@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.select import Device
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from tests.render import normals_oracle as oracle
 from tests.render.normals_oracle import unit

@@ -8,10 +8,10 @@ from concurrent.futures import ThreadPoolExecutor
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.renderers.plan import PlannedView
-from clfractal.renderers.resources import Resources
+from clfractal.engine.drawing import Drawing, OutputBuffers
+from clfractal.integrators.kept import Resources
+from clfractal.integrators.plan import PlannedView
 from clfractal.scene.model import Scene
-from clfractal.work.drawing import Drawing, OutputBuffers
 from tests.render.shots import plan_of
 
 

@@ -28,10 +28,10 @@ SHAPES = {
 }
 
 _TEXT = """\
-#include "lanes.h"
-#include "vectors.h"
-#include "sampling.h"
-#include "phase.h"
+#include "device/lanes.h"
+#include "device/vectors.h"
+#include "integrators/sampling.h"
+#include "shading/phase.h"
 """
 _SAMPLES = """\
 __kernel void squares(__global const int *pixels, __global scalar *result, int n, uint seed, uint purpose) {

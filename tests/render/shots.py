@@ -8,20 +8,20 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.camera.views import View, camera_view
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.optics.view import View, camera_view
-from clfractal.pictures.film import Film
-from clfractal.pictures.tiled import TiledStore
-from clfractal.pictures.tiles import TILE, Tile
-from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.plan import Plan, PlannedView, make_plan
+from clfractal.engine.engine import Engine
+from clfractal.engine.job import Identity, Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import Progress, WorkItem, run
+from clfractal.images.film import Film
+from clfractal.images.tiled import TiledStore
+from clfractal.images.tiles import TILE, Tile
+from clfractal.integrators.lanes import best_lanes
+from clfractal.integrators.plan import Plan, PlannedView, make_plan
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye
-from clfractal.work.engine import Engine
-from clfractal.work.job import Identity, Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import Progress, WorkItem, run
 from tests.scenes import BALL_ITERATIONS
 
 Floats = npt.NDArray[np.float64]

@@ -7,14 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from clfractal.pictures.anaglyph import (
-    IDEAL,
-    LUMINANCE,
-    Glasses,
-    Method,
-    matrices,
-    mix,
-)
+from clfractal.images.anaglyph import IDEAL, LUMINANCE, Glasses, Method, matrices, mix
 from tests.ghosting import REAL_RED_CYAN, filtered, ghosting, leaking
 
 GLASSES: tuple[Glasses, ...] = ("red_cyan", "green_magenta", "amber_blue")

@@ -13,7 +13,7 @@ import clfractal
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
 from clfractal.errors import ClfractalError
-from clfractal.renderers.points import distances
+from clfractal.integrators.points import distances
 from clfractal.scene.load import dump_scene
 from tests.devices import check_usable
 from tests.render.color_maps import BULB, ramp

@@ -1,4 +1,4 @@
-"""Materials whose normal is not the surface's (`kernels/bsdf_bumped.h`): no light is lost, none goes below the surface."""
+"""Materials whose normal is not the surface's (`bsdf_bumped.h`): no light is lost, none goes below the surface."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def chain_of(name: str) -> Chain:
 
 @lru_cache
 def program() -> SmallKernels:
-    tail = "".join(map(kernel_file, ("orbit.h", "solids.h", "points.cl")))
+    tail = "".join(map(kernel_file, ("formulas/orbit.h", "formulas/solids.h", "formulas/points.cl")))
     return formula_kernels(
         device(), batch_text([write_formula(chain_of(n)) for n in CHAINS], tail), "float64", 1
     )

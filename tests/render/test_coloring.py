@@ -14,10 +14,10 @@ from clfractal.device.select import has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import records
-from clfractal.renderers.kinds import TRAPS, kind_text
-from clfractal.renderers.lanes import best_lanes
+from clfractal.integrators import records
+from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
+from clfractal.shading.kind_numbers import TRAPS, kind_text
 from tests.devices import device
 from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
 from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
@@ -93,7 +93,10 @@ def compiled(text: str, precision: Precision, lanes: int) -> SmallKernels:
 def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> SmallKernels:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
     head = kind_text() + "#define PALETTE_SIZE 256\n"
-    headers = "".join(kernel_file(name) for name in ("orbit.h", "solids.h", "coloring.h", "shade.h"))
+    headers = "".join(
+        kernel_file(name)
+        for name in ("formulas/orbit.h", "formulas/solids.h", "shading/coloring.h", "shading/shade.h")
+    )
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 
 

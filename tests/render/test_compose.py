@@ -10,15 +10,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
-from clfractal.pictures.compose import (
-    Composed,
-    compose,
-    composed_channels,
-    eye_regions,
-)
-from clfractal.pictures.film import Film
-from clfractal.pictures.modes import eye_size, picture_size
-from clfractal.pictures.tiles import Region
+from clfractal.images.compose import Composed, compose, composed_channels, eye_regions
+from clfractal.images.film import Film
+from clfractal.images.modes import eye_size, picture_size
+from clfractal.images.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, films, stereo
 
 

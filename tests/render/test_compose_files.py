@@ -14,13 +14,13 @@ from PIL import Image
 from clfractal.errors import FileError
 from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
-from clfractal.pictures.compose import Composed, eye_regions
-from clfractal.pictures.film import Film
-from clfractal.pictures.formats import check_views
-from clfractal.pictures.modes import eye_size
-from clfractal.pictures.outputs import pair_paths, save_outputs, save_views
-from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiles import Region
+from clfractal.images.compose import Composed, eye_regions
+from clfractal.images.film import Film
+from clfractal.images.formats import check_views
+from clfractal.images.modes import eye_size
+from clfractal.images.outputs import pair_paths, save_outputs, save_views
+from clfractal.images.store import JournalFilm
+from clfractal.images.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, stereo
 
 

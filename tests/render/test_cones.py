@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.pictures.film import Film
-from clfractal.renderers import march, waves
-from clfractal.renderers.kernel import BLOCK
-from clfractal.renderers.plan import make_plan
+from clfractal.images.film import Film
+from clfractal.integrators import march, waves
+from clfractal.integrators.kernel import BLOCK
+from clfractal.integrators.plan import make_plan
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,

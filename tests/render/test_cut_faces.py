@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.formulas import reference
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from tests.devices import check_usable
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of

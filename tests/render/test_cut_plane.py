@@ -12,11 +12,11 @@ import clfractal
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
-from clfractal.pictures.tiles import TileGrid
-from clfractal.renderers.cut_plane import renderer_of
-from clfractal.renderers.plan import choose_precision
+from clfractal.images.tiles import TileGrid
+from clfractal.integrators.cut_plane import renderer_of
+from clfractal.integrators.plan import choose_precision
 from clfractal.scene.palette import named_table
-from clfractal.scene.plane import moved
+from clfractal.scene.rectangle import moved
 from tests.render.planes import SMOOTH_RADIUS, Floats, mandelbrot, picture_of, pixel_points, plane_scene, sure
 from tests.render.shots import plan_of, render_tile, shoot, stacked
 

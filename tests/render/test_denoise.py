@@ -15,8 +15,8 @@ from clfractal.device.select import Device
 from clfractal.errors import FileError
 from clfractal.files.channels import NOISY, NORMAL
 from clfractal.files.exr import read_exr
-from clfractal.pictures.denoise import denoised
-from clfractal.pictures.film import Film
+from clfractal.images.denoise import denoised
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import path, scene_of
 from tests.render.shots import engine_of

@@ -1,4 +1,4 @@
-"""Places of objects that shine (`kernels/emitter_places.h`): each choice has the density that is told, and all is found."""
+"""Places of objects that shine (`emitter_places.h`): each choice has the density that is told, and all is found."""
 
 from __future__ import annotations
 

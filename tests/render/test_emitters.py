@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.renderers.emitters import asked_radiance
 from clfractal.scene.model import Scene
+from clfractal.shading.emitters import asked_radiance
 from tests.render.objects_oracle import NOWHERE, rotation_of
 from tests.render.shots import Floats, points_of, shoot, stacked
 from tests.scenes import scene_of

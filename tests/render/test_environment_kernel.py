@@ -1,4 +1,4 @@
-"""`kernels/environment.h`: what light comes from where, and directions chosen by brightness.
+"""`kernels/shading/environment.h`: what light comes from where, and directions chosen by brightness.
 
 The references are written in NumPy from the definitions: where a direction lies in the picture, what a linear
 blend is, and that the cells of the tables have equal density per steradian.
@@ -16,9 +16,9 @@ import pytest
 from scipy import stats
 
 from clfractal.device.structs import Precision
-from clfractal.renderers.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from clfractal.scene.environment import EnvironmentMap, read_map
 from clfractal.scene.lighting import Environment
+from clfractal.shading.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from tests.devices import check_usable
 from tests.render.environment_kernel import ask, every_variant, settings_of
 
@@ -266,7 +266,7 @@ def test_large_maps_have_small_tables() -> None:
 
 def test_means_and_maxima_of_cells() -> None:
     """Cells that do not fit the pixels, compared with a fine sum over the blended light."""
-    from clfractal.renderers import environment
+    from clfractal.shading import environment
 
     pixels = a_map(9)
     mean_bounds = (0.999, 1.02)

@@ -12,11 +12,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clfractal.device.select import Device
+from clfractal.engine import drawing
 from clfractal.files.channels import MATTES, SURFACE_LAYERS
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work import drawing
 from tests.features import APART, CUT_PLANE, OF_MEDIA, SURFACE, VOLUME, Values, put_together
 from tests.gpu.pairs import covering
 from tests.portability.pictures import FOLDER

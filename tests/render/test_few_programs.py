@@ -9,8 +9,8 @@ import pytest
 
 from clfractal.device import program
 from clfractal.device.select import Device
-from clfractal.renderers import cut_plane, volume
-from clfractal.renderers.surface import PROGRAMS, program_texts
+from clfractal.integrators import cut_plane, volume
+from clfractal.integrators.surface import PROGRAMS, program_texts
 from clfractal.scene.model import Scene
 from tests.makers import maker
 from tests.platforms.programs import every_text

@@ -11,8 +11,8 @@ from PIL import Image
 from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.srgb import encode8
-from clfractal.pictures.film import Film
-from clfractal.pictures.tiles import Region
+from clfractal.images.film import Film
+from clfractal.images.tiles import Region
 
 ALL = tuple(CHANNELS)
 

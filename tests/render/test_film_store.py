@@ -17,12 +17,12 @@ from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
-from clfractal.pictures.film import Film
-from clfractal.pictures.formats import Content, check_output
-from clfractal.pictures.outputs import save_outputs
-from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiled import TiledStore
-from clfractal.pictures.tiles import Region
+from clfractal.images.film import Film
+from clfractal.images.formats import Content, check_output
+from clfractal.images.outputs import save_outputs
+from clfractal.images.store import JournalFilm
+from clfractal.images.tiled import TiledStore
+from clfractal.images.tiles import Region
 from tests.files.limits import file_size_limit
 
 ALL = tuple(CHANNELS)
@@ -193,9 +193,9 @@ def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 import numpy as np
-from clfractal.pictures.film import Film
-from clfractal.pictures.outputs import save_outputs
-from clfractal.pictures.store import JournalFilm
+from clfractal.images.film import Film
+from clfractal.images.outputs import save_outputs
+from clfractal.images.store import JournalFilm
 
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024

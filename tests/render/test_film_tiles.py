@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.pictures.tiles import TILE, Region, TileGrid
+from clfractal.images.tiles import TILE, Region, TileGrid
 
 regions = st.builds(
     Region, st.integers(0, 200), st.integers(0, 200), st.integers(1, 300), st.integers(1, 300)

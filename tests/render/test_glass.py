@@ -1,4 +1,4 @@
-"""Glass (`kernels/bsdf_glass.h`) keeps energy from both sides, is the same both ways and bends light by Snell's law."""
+"""Glass (`bsdf_glass.h`) keeps energy from both sides, is the same both ways and bends light by Snell's law."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy.typing as npt
 import pytest
 from scipy.stats import chi2
 
-from clfractal.renderers.glass import fresnel_across, seen_colors, wavelengths
 from clfractal.scene.materials import PbrMaterial
+from clfractal.shading.glass import fresnel_across, seen_colors, wavelengths
 from tests.render.lobes import COSINES, numbers, toward
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.variants import one_of

@@ -11,8 +11,8 @@ import yaml
 import clfractal
 from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS, NOISY
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.surface import program_texts
 from tests.render.glass_scenes import BODIES, Floats, colors_of, glass, scene
 from tests.render.path_scenes import BALL, path, scene_of
 from tests.variants import one_of

@@ -12,8 +12,8 @@ import yaml
 import clfractal
 from clfractal.device.select import choose
 from clfractal.errors import SceneError
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.surface import program_texts
 from tests.portability.pictures import picture
 from tests.render.glass_scenes import ball
 from tests.render.path_scenes import BALL, path, scene_of, seen

@@ -13,9 +13,9 @@ from scipy import ndimage
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
 from clfractal.formulas.language import Chain
-from clfractal.pictures.film import Film
-from clfractal.renderers.lanes import best_lanes
-from clfractal.renderers.points import escape
+from clfractal.images.film import Film
+from clfractal.integrators.lanes import best_lanes
+from clfractal.integrators.points import escape
 from tests.render.shots import Floats, points_of, shoot
 from tests.scenes import scene_of
 

@@ -11,10 +11,10 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.work.films import JobFilms
-from clfractal.work.job import Job
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import run
+from clfractal.engine.job import Job
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import run
 from tests.render.job_scenes import SCENES, lit_by_a_file, scene_of
 from tests.render.shots import engine_of
 from tests.shell import command, environment
@@ -29,9 +29,9 @@ WORKER = """
 import pickle, sys
 import numpy as np
 from clfractal.device.select import by_key
-from clfractal.work.films import JobFilms
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import run
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import run
 job = pickle.load(sys.stdin.buffer)
 films = JobFilms(job)
 run(job, films.films, LocalExecutor(by_key(job.device.index, job.device.key)))

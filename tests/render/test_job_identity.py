@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.engine.job import Job
+from clfractal.engine.prepare import prepare
 from clfractal.errors import FileError
-from clfractal.pictures.store import JournalFilm
+from clfractal.images.store import JournalFilm
 from clfractal.scene.model import Scene
-from clfractal.work.job import Job
-from clfractal.work.prepare import prepare
 from tests.render.job_scenes import SCENES, scene_of
 
 KEYS = {"scene", "environment", "grid", "version", "device", "driver", "lanes"}

@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.surface import program_texts
 from tests.render.joined_oracle import (
     PLACED,
     SCALE,

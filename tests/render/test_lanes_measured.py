@@ -12,13 +12,13 @@ import pytest
 
 from clfractal.device import cache, child, select, tune
 from clfractal.device.select import Device, choose
+from clfractal.engine.prepare import prepare
 from clfractal.errors import DeviceError
 from clfractal.formulas.catalog import load_chain
-from clfractal.renderers import lanes
-from clfractal.renderers.lanes import best_lanes, is_measured, march_reports, rule_of
-from clfractal.renderers.trial import RULES, Rule, march
+from clfractal.integrators import lanes
+from clfractal.integrators.lanes import best_lanes, is_measured, march_reports, rule_of
+from clfractal.integrators.trial import RULES, Rule, march
 from clfractal.scene.load import load_scene
-from clfractal.work.prepare import prepare
 from tests.portability.lane_counts import accepted_in_use
 
 pytestmark = pytest.mark.conformance

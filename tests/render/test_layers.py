@@ -14,8 +14,8 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
 from clfractal.files.channels import ALBEDO, LIGHT_LAYERS, NORMAL, RAY_CHANNELS, SURFACE_LAYERS
-from clfractal.pictures.film import Film
-from clfractal.renderers.passes import kept_numbers
+from clfractal.images.film import Film
+from clfractal.integrators.passes import kept_numbers
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import BLACK, path, scene_of
 from tests.render.shots import plan_of, repeated, shoot

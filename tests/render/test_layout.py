@@ -12,7 +12,7 @@ from clfractal.device import cache
 from clfractal.device.select import choose, has_float64
 from clfractal.device.struct_layout import verify
 from clfractal.device.structs import Precision, Struct
-from clfractal.renderers.declarations import STRUCTS
+from clfractal.integrators.declarations import STRUCTS
 
 pytestmark = pytest.mark.conformance
 

@@ -11,11 +11,11 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.pictures.film import Film
+from clfractal.engine.run import Progress
+from clfractal.images.film import Film
 from clfractal.scene.layout import Place
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.run import Progress
 from tests.devices import check_usable
 from tests.render.layouts import GAP, VIEWS, scene_of
 from tests.render.shots import engine_of

@@ -9,12 +9,12 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.run import run
 from clfractal.errors import FileError, SceneError
 from clfractal.scene.layout import Layout
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.films import JobFilms
-from clfractal.work.run import run
 from tests.render.layouts import GAP, VIEWS, scene_of
 from tests.render.shots import CHANNELS, engine_of, shoot, shoot_whole, stacked
 

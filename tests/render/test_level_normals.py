@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from clfractal.schema.shape import turned_axes

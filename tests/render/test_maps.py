@@ -14,12 +14,12 @@ from PIL import Image
 import clfractal
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
+from clfractal.engine.prepare import prepare
 from clfractal.errors import ClfractalError
 from clfractal.files.srgb import decode
-from clfractal.renderers.maps import level_sizes, levels_of
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
-from clfractal.work.prepare import prepare
+from clfractal.shading.maps import level_sizes, levels_of
 from tests.devices import check_usable
 from tests.render.color_maps import BULB, Floats, ramp
 from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen

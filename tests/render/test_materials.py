@@ -1,4 +1,4 @@
-"""Materials (`kernels/bsdf.h`) keep energy, are the same both ways, and are sampled as their density says."""
+"""Materials (`bsdf.h`) keep energy, are the same both ways, and are sampled as their density says."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.renderers.glass import found_glass, glass_tables
-from clfractal.renderers.scattering import COSINES as COSINES_OF_TABLES
-from clfractal.renderers.scattering import ROUGHNESSES, albedo_tables, found_albedos, fresnel
+from clfractal.shading.glass import found_glass, glass_tables
+from clfractal.shading.scattering import COSINES as COSINES_OF_TABLES
+from clfractal.shading.scattering import ROUGHNESSES, albedo_tables, found_albedos, fresnel
 from tests.render.lobes import COSINES, LOBES, NO_GLOSS, Floats, hemisphere, material, numbers, toward
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of

@@ -17,11 +17,11 @@ from clfractal.device.select import Device
 from clfractal.errors import SceneError
 from clfractal.files.channels import MATERIAL_MATTES, MATTES, NUMBERED, OBJECT_MATTES
 from clfractal.files.exr import read_exr
-from clfractal.pictures.film import Film
-from clfractal.renderers import carried
-from clfractal.renderers.mattes import bits_of, identifier, murmur3, ranked
-from clfractal.renderers.state import state_numbers
-from clfractal.renderers.surface import program_texts
+from clfractal.images.film import Film
+from clfractal.integrators import carried
+from clfractal.integrators.state import state_numbers
+from clfractal.integrators.surface import program_texts
+from clfractal.shading.mattes import bits_of, identifier, murmur3, ranked
 from tests.render.path_scenes import path, scene_of
 from tests.render.shots import plan_of, repeated
 from tests.variants import one_of

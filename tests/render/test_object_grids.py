@@ -11,7 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.renderers.object_grids import brick_ranges
+from clfractal.geometry.object_grids import brick_ranges
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed, volumes_of
 from tests import scenes

@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.surface import program_texts
 from clfractal.scene.movement import movement_of
 from tests.render.objects_oracle import NOWHERE, met
 from tests.render.shots import (
@@ -117,7 +117,7 @@ def test_water_is_its_sum_of_waves(
 
 
 def test_significant_height_and_movement_of_waves() -> None:
-    from clfractal.renderers.water import GRAVITY, wave_set
+    from clfractal.geometry.water import GRAVITY, wave_set
     from clfractal.scene.objects import WaterObject
     from tests.render.objects_oracle import heights
 

@@ -11,16 +11,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.api import load_scene, render
+from clfractal.camera.views import seen_by
+from clfractal.engine.engine import Engine
+from clfractal.engine.prepare import with_size
 from clfractal.errors import SceneError
-from clfractal.optics.view import seen_by
-from clfractal.pictures.film import Film
-from clfractal.renderers.fineness import NEAR, Fineness
-from clfractal.renderers.march import SHADOW_DETAIL, march_record
+from clfractal.geometry.fineness import NEAR, Fineness
+from clfractal.images.film import Film
+from clfractal.integrators.march import SHADOW_DETAIL, march_record
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
-from clfractal.work.engine import Engine
-from clfractal.work.prepare import with_size
 
 BLOCKS = 12
 SCENE = """

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.surface import program_texts
 from tests.devices import check_usable
 from tests.render.glass_scenes import BODIES, ball, colors_of, glass, scene
 from tests.render.half_space import depth_function

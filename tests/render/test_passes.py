@@ -11,12 +11,12 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.pictures.film import Film
-from clfractal.renderers.passes import kept_numbers
-from clfractal.renderers.plan import Plan, PlannedView
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import run
+from clfractal.images.film import Film
+from clfractal.integrators.passes import kept_numbers
+from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
-from clfractal.work.local import LocalExecutor
-from clfractal.work.run import run
 from tests.render.passes import RENDERERS, SIZE, scene_with
 from tests.render.shots import CHANNELS, job_of, plan_of, shoot, stacked
 from tests.variants import one_of
@@ -78,8 +78,8 @@ def test_tiles_in_parts_have_the_same_bits(
     scene = scene_with(kind, **NOISY)
     plan = plan_of(scene, device)
     spans: list[tuple[tuple[int, int], tuple[int, int]]] = []
-    from clfractal.work.drawing import Drawing
-    from clfractal.work.stages import Span
+    from clfractal.engine.drawing import Drawing
+    from clfractal.engine.stages import Span
 
     start = Drawing.start
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.pictures.film import Film, in_memory
-from clfractal.pictures.paste import Pasted
-from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiled import Picture
-from clfractal.pictures.tiles import TILE, Region
+from clfractal.images.film import Film, in_memory
+from clfractal.images.paste import Pasted
+from clfractal.images.store import JournalFilm
+from clfractal.images.tiled import Picture
+from clfractal.images.tiles import TILE, Region
 from clfractal.scene.layout import Place
 from tests.render.eyes import filled
 

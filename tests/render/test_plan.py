@@ -10,8 +10,8 @@ import pytest
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.errors import SceneError
-from clfractal.pictures.tiles import Region
-from clfractal.renderers.plan import (
+from clfractal.images.tiles import Region
+from clfractal.integrators.plan import (
     FLOAT32_STEPS_PER_PIXEL,
     choose_precision,
     finest_steps,

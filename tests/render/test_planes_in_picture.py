@@ -15,7 +15,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
-from clfractal.renderers.plan import choose_precision
+from clfractal.integrators.plan import choose_precision
 from clfractal.scene.model import Scene
 from tests.render.planes import mandelbrot, sure
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane

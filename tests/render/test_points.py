@@ -15,7 +15,7 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.renderers import points
+from clfractal.integrators import points
 from tests.devices import device, usable
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
@@ -27,7 +27,7 @@ PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
 def only(kernel: str) -> str:
     """`points.cl` after the formula, with one of its two kernels: the other would be compiled for nothing."""
-    text = "".join(map(kernel_file, ("orbit.h", "solids.h", "points.cl")))
+    text = "".join(map(kernel_file, ("formulas/orbit.h", "formulas/solids.h", "formulas/points.cl")))
     parts = re.split(r"^(?=__kernel )", text, flags=re.MULTILINE)
     kept = [part for part in parts[1:] if part.startswith(f"__kernel void {kernel}(")]
     assert len(kept) == 1

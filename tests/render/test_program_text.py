@@ -10,8 +10,8 @@ from tests.shell import environment
 CODE = """
 import hashlib
 from clfractal.formulas import catalog
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.surface import program_texts
 from clfractal.scene.load import load_scene
 for name in catalog.names():
     julia = {"julia": [0.1, 0.2, 0.3, 0.4]} if name == "quaternion_julia" else {}

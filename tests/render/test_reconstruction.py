@@ -14,8 +14,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.files.exr import write_exr
 from clfractal.files.srgb import encode
-from clfractal.pictures.film import Film
-from clfractal.pictures.outputs import save_outputs
+from clfractal.images.film import Film
+from clfractal.images.outputs import save_outputs
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
 from tests.render.sequence import unit_squares

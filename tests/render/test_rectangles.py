@@ -1,4 +1,4 @@
-"""Rectangles as points see them (`kernels/rectangles.h`): chosen evenly by solid angle, from wherever they are seen."""
+"""Rectangles as points see them (`rectangles.h`): chosen evenly by solid angle, from wherever they are seen."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ from scipy.stats import chi2, qmc
 
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
-from clfractal.renderers.records import LIGHT
+from clfractal.integrators.records import LIGHT
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = f"""\
-#include "lanes.h"
-#include "numbers/real.h"
-#include "vectors.h"
+#include "device/lanes.h"
+#include "formulas/numbers/real.h"
+#include "device/vectors.h"
 #include "structs.h"
-#include "sampling.h"
-#include "rectangles.h"
+#include "integrators/sampling.h"
+#include "geometry/rectangles.h"
 {LOADS}
 // Planes of `count` numbers. In: u, v. Out: the direction, its density.
 __kernel void look(__global const scalar *in, __global scalar *out, __constant struct Light *light, scalar x, scalar y,

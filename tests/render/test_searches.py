@@ -20,7 +20,7 @@ from clfractal.formulas.backends import NumpyBackend
 from clfractal.formulas.catalog import names
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.reference import apply, constant_of, space_to_state
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
 from tests.render.shots import (

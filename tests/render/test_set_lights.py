@@ -10,11 +10,11 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.formulas import reference
-from clfractal.renderers.kinds import TRAPS
-from clfractal.renderers.set_lights import BALL_NUMBERS, SetLights, packed, probabilities, set_lights_of
 from clfractal.scene import places
 from clfractal.scene.model import Scene
 from clfractal.schema.trap import Trap
+from clfractal.shading.kind_numbers import TRAPS
+from clfractal.shading.set_lights import BALL_NUMBERS, SetLights, packed, probabilities, set_lights_of
 from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, shoot, stacked
 from tests.render.traps import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
 from tests.scenes import scene_of

@@ -15,15 +15,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import clfractal
+from clfractal.camera.views import View
+from clfractal.engine.engine import Engine
+from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError, SceneError
-from clfractal.optics.view import View
-from clfractal.pictures.film import Film
-from clfractal.renderers import shutter as shutters
-from clfractal.renderers.shutter import Shutter, shutter_of
+from clfractal.images.film import Film
+from clfractal.integrators import shutter as shutters
+from clfractal.integrators.shutter import Shutter, shutter_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
-from clfractal.work.job import Job
 from tests.render.shots import BALL, BALL_RADIUS
 from tests.scenes import BALL_ITERATIONS
 from tests.variants import combinations, one_of
@@ -136,7 +136,7 @@ def test_a_view_is_mixed_within_a_part_of_a_pixel_whatever_way_it_goes() -> None
 
 
 def clfractal_view(shutter: Shutter, time: float) -> View:
-    from clfractal.optics.view import scene_view
+    from clfractal.camera.views import scene_view
 
     return scene_view(*shutter.seen(time))
 

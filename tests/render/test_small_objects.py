@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, colors, points_of, shoot

@@ -8,18 +8,18 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from clfractal.camera.views import View, scene_view, seen_by
 from clfractal.device import program
 from clfractal.device.select import Device
-from clfractal.optics.stereo import eye_views, parallax
-from clfractal.optics.view import View, scene_view, seen_by
-from clfractal.pictures.film import Film
-from clfractal.renderers import plan, volume
+from clfractal.engine.engine import Engine
+from clfractal.engine.job import StereoPair
+from clfractal.engine.prepare import prepare
+from clfractal.images.film import Film
+from clfractal.integrators import plan, volume
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName
+from clfractal.stereo.eyes import eye_views, parallax
 from clfractal.voxels import fill as voxels
-from clfractal.work.engine import Engine
-from clfractal.work.job import StereoPair
-from clfractal.work.prepare import prepare
 from tests.render.shots import BALL, BALL_RADIUS, CHANNELS, engine_of, points_of, shoot, stacked
 from tests.scenes import scene_of
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.optics.stereo import eye_views
-from clfractal.optics.view import View, camera_view, scene_view, seen_by, shown_views
+from clfractal.camera.views import View, camera_view, scene_view, seen_by, shown_views
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Eye, EyeName
+from clfractal.stereo.eyes import eye_views
 from tests.render.shots import BALL
 from tests.render.stereo_geometry import CAMERA, PLANE, SIDES, dot, unit
 from tests.scenes import scene_of

@@ -15,11 +15,11 @@ from hypothesis import given as given_any
 from hypothesis import settings as limits
 from hypothesis import strategies as st
 
+from clfractal.camera.views import View, camera_view, eye_view, middle_view
 from clfractal.errors import SceneError
-from clfractal.optics.stereo import NEAREST, attitude, degrees, frustum, parallax, relation
-from clfractal.optics.view import View, camera_view, eye_view, middle_view
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, EyeName, Stereo
+from clfractal.stereo.eyes import NEAREST, attitude, degrees, frustum, parallax, relation
 from tests.render.shots import BALL, ORTHOGRAPHIC
 from tests.render.stereo_geometry import CAMERA, SIDES, Floats, dot, unit
 from tests.scenes import scene_of

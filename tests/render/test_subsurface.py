@@ -14,8 +14,8 @@ import yaml
 
 import clfractal
 from clfractal.errors import SceneError
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.surface import program_texts
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.devices import check_usable
 from tests.render.glass_scenes import BODIES, colors_of, scene

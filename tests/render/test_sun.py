@@ -1,4 +1,4 @@
-"""The sun of a sky: `kernels/sun.h` against its definition in NumPy, and in pictures."""
+"""The sun of a sky: `kernels/shading/sun.h` against its definition in NumPy, and in pictures."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ import pytest
 
 import clfractal
 from clfractal.device.structs import Precision
-from clfractal.renderers.environment import pack_environment
 from clfractal.scene.atmosphere import SUN_RADIUS
 from clfractal.scene.lighting import Sky
 from clfractal.scene.sky import bake, pixel_areas
 from clfractal.scene.sun import SOLID_ANGLE, Sun, sun_of
+from clfractal.shading.environment import pack_environment
 from tests.devices import check_usable
 from tests.render.environment_kernel import ask, every_variant, settings_of
 

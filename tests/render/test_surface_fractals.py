@@ -116,8 +116,8 @@ def normal_and_count(
 def test_smooth_counts_have_no_jumps(device: Device) -> None:
     """Along a line out of the Mandelbulb the smooth count falls steadily, through every whole number."""
     from clfractal.formulas.catalog import load_chain
-    from clfractal.renderers.lanes import best_lanes
-    from clfractal.renderers.points import distances
+    from clfractal.integrators.lanes import best_lanes
+    from clfractal.integrators.points import distances
 
     line = np.linspace(2.0, 0.4, 8001)[:, None] * np.array([[0.48, 0.6, 0.64]])
     lanes = best_lanes(device, "float32")

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.pictures.film import Film
+from clfractal.images.film import Film
 from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.model import Scene
 from tests.render.shots import (

@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal import resources
 from clfractal.device.select import Device
-from clfractal.files.environment import read_environment
+from clfractal.files import resources
+from clfractal.files.environment_map import read_environment
 from clfractal.files.exr import write_exr
-from clfractal.pictures.film import Film
-from clfractal.renderers.march import march_record
-from clfractal.renderers.records import HemisphereRays, hemisphere_rays
+from clfractal.images.film import Film
+from clfractal.integrators.march import march_record
+from clfractal.integrators.records import HemisphereRays, hemisphere_rays
 from clfractal.scene.model import Scene
 from tests.render.known_lights import BRIGHT, ground
 from tests.render.shots import (

@@ -12,14 +12,15 @@ import pytest
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes
-from clfractal.pictures.film import Film
-from clfractal.pictures.store import JournalFilm
-from clfractal.pictures.tiles import TILE, TileGrid
-from clfractal.renderers.lanes import best_lanes
+from clfractal.engine import drawing
+from clfractal.engine import local_executor as local
+from clfractal.engine.run import Progress
+from clfractal.engine.stages import Span
+from clfractal.images.film import Film
+from clfractal.images.store import JournalFilm
+from clfractal.images.tiles import TILE, TileGrid
+from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
-from clfractal.work import drawing, local
-from clfractal.work.run import Progress
-from clfractal.work.stages import Span
 from tests.render.bits import close, same
 from tests.render.shots import (
     CHANNELS,

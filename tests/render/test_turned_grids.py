@@ -15,9 +15,9 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
-from clfractal.files.volume import Volume, read_volume, write_volume
+from clfractal.engine.engine import Engine
+from clfractal.files.volume_file import Volume, read_volume, write_volume
 from clfractal.scene.model import Scene
-from clfractal.work.engine import Engine
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import (
     ORTHOGRAPHIC,

@@ -12,12 +12,12 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes
-from clfractal.files.volume import Volume, write_volume
-from clfractal.pictures.tiles import TileGrid
-from clfractal.renderers.lanes import best_lanes
+from clfractal.engine import drawing
+from clfractal.files.volume_file import Volume, write_volume
+from clfractal.images.tiles import TileGrid
+from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
-from clfractal.work import drawing
 from tests import scenes
 from tests.render.bits import close, same
 from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, render_tile, shoot, stacked

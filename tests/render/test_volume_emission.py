@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.renderers.transfer import MOST_OPACITY
 from clfractal.scene.load import load_scene
+from clfractal.shading.transfer import MOST_OPACITY
 from tests.render.shots import Floats, rays, shoot, stacked
 from tests.render.volumes import keep, to_box
 

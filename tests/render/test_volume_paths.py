@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-import clfractal.renderers.volume
+import clfractal.integrators.volume
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
-from clfractal.renderers.volume import brick_bounds
+from clfractal.integrators.volume import brick_bounds
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
@@ -311,7 +311,7 @@ def test_double_precision(device: Device, folder: Path, monkeypatch: pytest.Monk
     """Rays of float64 show the same medium."""
     scene = medium(folder, **{**LAMPS, "samples": 128})
     single = light_of(scene, device)
-    monkeypatch.setattr(clfractal.renderers.volume, "ray_precision", lambda scene, plan: "float64")
+    monkeypatch.setattr(clfractal.integrators.volume, "ray_precision", lambda scene, plan: "float64")
     # (By an executor of its own, which keeps no buffers of the other type.)
     double = light_of(medium(folder, **{**LAMPS, "samples": 128}), device, budget_seconds=1.0)
     assert double.mean() == pytest.approx(single.mean(), rel=0.02)

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.volume import Volume, write_volume
+from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL, Floats, rays

@@ -13,15 +13,15 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from clfractal import camera
+from clfractal.camera.views import camera_view
+from clfractal.engine.variations import variations
+from clfractal.engine.varied import Kind
 from clfractal.errors import FileError, SceneError
-from clfractal.files.volume import Volume, write_volume
-from clfractal.optics.view import camera_view
+from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import angles, orbited
 from clfractal.viewer.saving import open_source, scene_text
-from clfractal.work.variations import variations
-from clfractal.work.varied import Kind
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\nimage: {width: 96, height: 54}\n"
 numbers = st.floats(-5, 5, allow_nan=False)

@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal import resources
 from clfractal.errors import ClfractalError, FileError, SceneError
-from clfractal.files.environment import read_environment
+from clfractal.files import resources
+from clfractal.files.environment_map import read_environment
 from clfractal.files.exr import write_exr
 from clfractal.scene.environment import names
 from clfractal.scene.lighting import Environment

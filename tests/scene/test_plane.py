@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from clfractal.errors import SceneError
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.scene.plane import AXES, Axis, Placed, Plane, moved, rotated, scaled
+from clfractal.scene.rectangle import AXES, Axis, Placed, Plane, moved, rotated, scaled
 
 Floats = npt.NDArray[np.float64]
 

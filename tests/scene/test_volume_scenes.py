@@ -11,10 +11,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clfractal.device.select import choose
+from clfractal.engine.engine import Engine
 from clfractal.errors import DeviceError
-from clfractal.files.volume import Volume, write_volume
+from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
-from clfractal.work.engine import Engine
 from tests.scene.errors import error_of, marked
 from tests.scenes import HEAD, scene_of
 

@@ -9,10 +9,10 @@ import numpy as np
 import numpy.typing as npt
 from hypothesis import strategies as st
 
-from clfractal.optics.view import camera_view
+from clfractal.camera.views import camera_view
 from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
-from clfractal.scene.plane import Plane
+from clfractal.scene.rectangle import Plane
 from clfractal.viewer import navigation
 from clfractal.viewer.navigation import project
 from clfractal.viewer.pose import pose_of

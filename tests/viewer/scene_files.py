@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from clfractal import resources
+from clfractal.files import resources
 from clfractal.scene.model import Scene
 
 SCENES = sorted(resources.folder("scenes").glob("*.yaml"))

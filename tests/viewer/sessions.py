@@ -11,15 +11,15 @@ import numpy as np
 
 import clfractal
 from clfractal.device.select import Device
-from clfractal.pictures.film import Film
+from clfractal.engine.canvas import CHANNELS
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.show import Look
+from clfractal.images.film import Film
 from clfractal.scene.model import Scene
 from clfractal.viewer.display import CopyTarget, Display, Shown
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.session import Session
-from clfractal.work.canvas import CHANNELS
-from clfractal.work.films import JobFilms
-from clfractal.work.show import Look
 from tests.scenes import STEREO, bulb_text
 
 SIZE = (96, 64)

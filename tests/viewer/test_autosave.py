@@ -15,8 +15,8 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, default_folder
 from clfractal.viewer.files import Files
-from clfractal.viewer.options import Options
 from clfractal.viewer.saving import SceneSource, open_source, save_scene
+from clfractal.viewer.window_options import Options
 from tests.viewer.scene_files import with_camera
 
 # Another window: keeps a scene with the given field of view, says so, and waits for its end.

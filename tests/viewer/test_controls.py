@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from clfractal.camera.views import scene_view
 from clfractal.device.select import Device
-from clfractal.optics.view import scene_view
 from clfractal.scene.model import Scene
 from clfractal.viewer.aim import Aim, aimed
 from clfractal.viewer.controls import ALT, CONTROL, LEFT, MIDDLE, RIGHT, SHIFT, Controls

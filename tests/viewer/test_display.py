@@ -11,9 +11,9 @@ import pyopencl as cl
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.pictures.outputs import png_bytes
+from clfractal.engine.show import Look
+from clfractal.images.outputs import png_bytes
 from clfractal.viewer.display import CopyTarget, Display
-from clfractal.work.show import Look
 from tests.scenes import STEREO
 from tests.viewer.sessions import BULB, films_of, scene_of, session_on, shown_frame, wait_for
 

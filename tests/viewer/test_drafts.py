@@ -10,16 +10,16 @@ import pytest
 
 from clfractal.device import activity
 from clfractal.device.select import Device
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare
+from clfractal.engine.run import run
 from clfractal.scene.light_paths import DirectLighting
 from clfractal.scene.lighting import DirectionalLight
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.drafts import draft
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.panels import overlay
-from clfractal.work.films import JobFilms
-from clfractal.work.local import LocalExecutor
-from clfractal.work.prepare import prepare
-from clfractal.work.run import run
 from tests.viewer.panel_harness import make_ui
 from tests.viewer.sessions import (
     BULB,

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal import resources
 from clfractal.errors import ClfractalError, SceneError
+from clfractal.files import resources
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.editing import differing, edited, plain_section, replaced, value_at

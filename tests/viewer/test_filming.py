@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 import clfractal
 from clfractal.scene.load import load_scene
 from clfractal.scene.parts import OrthographicCamera
-from clfractal.viewer import film_place, timeline
+from clfractal.viewer import film_place
+from clfractal.viewer import timeline_edits as timeline
 from clfractal.viewer.controls import Controls
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.navigation import dolly

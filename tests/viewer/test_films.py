@@ -20,15 +20,15 @@ pytest.importorskip("imgui_bundle")
 from PIL import Image
 
 from clfractal.device.select import Device
+from clfractal.engine.frames import frames
 from clfractal.errors import FileError
 from clfractal.files.frame_names import frame_file, frames_there
-from clfractal.pictures.outputs import output_files
+from clfractal.images.outputs import output_files
 from clfractal.scene.load import load_scene
 from clfractal.scene.stereo import Mode, Stereo
-from clfractal.viewer.films import FilmOrder, FilmQueue, RenderedFilm
+from clfractal.viewer.film_queue import FilmOrder, FilmQueue, RenderedFilm
 from clfractal.viewer.panels import films
 from clfractal.viewer.panels.ui import Ui
-from clfractal.work.frames import frames
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, headless, make_ui
 

@@ -10,7 +10,8 @@ import pytest
 
 pytest.importorskip("imgui_bundle")
 
-from clfractal.optics.view import scene_view
+from clfractal.camera.views import scene_view
+from clfractal.engine.engine import Engine
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.schema.shape import solids
@@ -19,7 +20,6 @@ from clfractal.viewer.panels import first, lights
 from clfractal.viewer.panels import objects as objects_panel
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.sight import Sight
-from clfractal.work.engine import Engine
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, make_ui
 

@@ -9,7 +9,7 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
-from clfractal.optics.view import scene_view
+from clfractal.camera.views import scene_view
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.panels import formula, formula_library

@@ -10,7 +10,7 @@ import pytest
 
 pytest.importorskip("imgui_bundle")
 
-from clfractal import resources
+from clfractal.files import resources
 from clfractal.files.document import read_document
 from clfractal.scene.load import load_scene
 from clfractal.viewer.formula_texts import FormulaTexts, formula_text_in, with_formula_text

@@ -20,15 +20,15 @@ from imgui_bundle import imgui
 from clfractal.device import cache
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.resources import folder
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.thumbnails import SIZE, shown_scene, words_of
+from clfractal.files.resources import folder
 from clfractal.scene.load import check_scene, load_scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.background import Thumbnail
 from clfractal.viewer.panels import gallery
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.shelf import Entry, Shelf, kind_of
-from clfractal.work.local import LocalExecutor
-from clfractal.work.thumbnails import SIZE, shown_scene, words_of
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, headless, make_ui
 
@@ -162,7 +162,7 @@ def kept(tmp_path_factory: pytest.TempPathFactory) -> bytes:
 @given(data=st.data())
 def test_a_damaged_picture_is_ignored(kept: bytes, data: st.DataObject) -> None:
     """Whatever byte is another, or wherever the file ends: no picture, or (in a comment) the right one."""
-    from clfractal.work import thumbnails as module
+    from clfractal.engine import thumbnails as module
 
     place = data.draw(st.integers(0, len(kept) - 1))
     if data.draw(st.booleans()):
@@ -177,8 +177,8 @@ def test_a_damaged_picture_is_ignored(kept: bytes, data: st.DataObject) -> None:
 
 
 def test_a_picture_of_another_size_is_ignored() -> None:
+    from clfractal.engine import thumbnails as module
     from clfractal.files.png import write_png_pixels
-    from clfractal.work import thumbnails as module
 
     path = module._place("key")
     path.parent.mkdir(parents=True)
@@ -187,7 +187,7 @@ def test_a_picture_of_another_size_is_ignored() -> None:
 
 
 def test_the_oldest_pictures_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    from clfractal.work import thumbnails as module
+    from clfractal.engine import thumbnails as module
 
     monkeypatch.setattr(module, "MOST_KEPT", 2)
     for number in range(4):
@@ -200,7 +200,7 @@ def test_the_oldest_pictures_go_first(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_without_a_cache_folder_pictures_are_only_not_kept(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from clfractal.work import thumbnails as module
+    from clfractal.engine import thumbnails as module
 
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "gone"))
     assert not list(cache.folder().iterdir())
@@ -354,7 +354,7 @@ def test_the_gallery_fits_into_every_window(
 
 
 def test_the_picture_of_a_scene_is_the_scene_at_its_size(device: Device) -> None:
-    from clfractal.work.thumbnails import SAMPLES
+    from clfractal.engine.thumbnails import SAMPLES
 
     small = shown_scene(load_scene(SCENE))
     task = Thumbnail(lambda: small, SIZE, SAMPLES)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.optics.view import View, camera_view, eye_view, middle_view
+from clfractal.camera.views import View, camera_view, eye_view, middle_view
 from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, Stereo

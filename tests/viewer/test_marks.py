@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.optics.view import scene_view
-from clfractal.viewer import handles, marks
+from clfractal.camera.views import scene_view
+from clfractal.viewer import handles
+from clfractal.viewer import marked_lines as marks
 from tests.render.shots import BALL, PERSPECTIVE
 from tests.scenes import scene_of
 from tests.viewer.panel_harness import headless

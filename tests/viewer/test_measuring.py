@@ -12,7 +12,7 @@ from clfractal.errors import DeviceError, Stopped
 from clfractal.viewer import measuring
 from clfractal.viewer.background import do_some
 from clfractal.viewer.measuring import REST_SECONDS, Measuring
-from clfractal.viewer.options import Options
+from clfractal.viewer.window_options import Options
 
 DEVICE = SimpleNamespace(info=SimpleNamespace(key="a device"))
 

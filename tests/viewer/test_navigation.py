@@ -11,7 +11,7 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from clfractal.optics.view import View, camera_view, eye_view, middle_view
+from clfractal.camera.views import View, camera_view, eye_view, middle_view
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import Extent
 from clfractal.scene.stereo import Eye, Stereo

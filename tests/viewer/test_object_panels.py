@@ -15,7 +15,7 @@ from imgui_bundle import imgui
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import load_scene
 from clfractal.scene.objects import VolumeObject
-from clfractal.scene.plane import rotated
+from clfractal.scene.rectangle import rotated
 from clfractal.viewer.panels import cut_planes, objects, renderer, scene_dock, transfer
 from clfractal.viewer.panels.ui import Ui
 from tests.render.volumes import keep

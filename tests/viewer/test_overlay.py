@@ -12,11 +12,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from imgui_bundle import imgui
 
+from clfractal.camera.views import scene_view
 from clfractal.files.document import read_document
-from clfractal.optics import stereo as geometry
-from clfractal.optics.view import scene_view
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
+from clfractal.stereo import eyes as geometry
 from clfractal.viewer import zoom_box
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.keys import KeyMap

@@ -12,7 +12,7 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
-from clfractal import resources
+from clfractal.files import resources
 from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import scene_dock
 from clfractal.viewer.panels import widgets as w

@@ -20,6 +20,7 @@ from imgui_bundle import imgui
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.scene.load import load_scene
 from clfractal.scene.palette import named_table
 from clfractal.scene.palettes import PALETTES
@@ -39,7 +40,6 @@ from clfractal.viewer.panels import (
     widgets,
 )
 from clfractal.viewer.panels.ui import Ui
-from clfractal.work.local import LocalExecutor
 from tests.variants import one_of
 from tests.viewer.panel_harness import INFO, Stage, background, make_ui, opened, screenshot
 

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.pictures.modes import eye_at
+from clfractal.engine.show import Look
+from clfractal.images.modes import eye_at
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.aim import aimed
@@ -17,7 +18,6 @@ from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.picking import picked
 from clfractal.viewer.pointer import project
 from clfractal.viewer.viewport import image_of, render_key
-from clfractal.work.show import Look
 from tests.render.shots import BALL_RADIUS
 from tests.viewer.sessions import BALL, scene_of, session_on, shown_frame, wait_for
 

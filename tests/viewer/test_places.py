@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.pictures.modes import picture_size
+from clfractal.images.modes import picture_size
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import APART, Stereo
-from clfractal.viewer.places import places_of
 from clfractal.viewer.viewport import image_of, render_key
+from clfractal.viewer.window_places import places_of
 from tests.scenes import STEREO
 from tests.viewer.sessions import scene_of
 

@@ -7,10 +7,10 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
+from clfractal.engine.show import Look
 from clfractal.viewer.panels import overlay
 from clfractal.viewer.picking import picked
 from clfractal.viewer.plane_count import PlaneCount, point_on_plane
-from clfractal.work.show import Look
 from tests.viewer.panel_harness import make_ui
 from tests.viewer.sessions import session_on, shown_frame, wait_for
 from tests.window.scenes import CUT_PLANE, LAYOUT

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.optics.view import plane_view
-from clfractal.scene.plane import Axis, Placed, Plane
+from clfractal.camera.views import plane_view
+from clfractal.scene.rectangle import Axis, Placed, Plane
 from clfractal.viewer import plane_moves
 from clfractal.viewer.navigation import point_at, project
 from tests.viewer.cameras import (

@@ -12,7 +12,7 @@ import pytest
 from clfractal.device import program
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError
-from clfractal.renderers.volume import VolumeKernel
+from clfractal.integrators.volume import VolumeKernel
 from clfractal.scene.model import Scene
 from clfractal.viewer.editing import edited
 from clfractal.viewer.frame import Frame

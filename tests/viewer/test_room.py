@@ -7,14 +7,14 @@ from typing import Any, cast
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.engine.comfort import comfort_of_films
+from clfractal.engine.show import Look
 from clfractal.viewer.cables import Cables
 from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.panels import overlay
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.room import Room
 from clfractal.viewer.window import Monitor
-from clfractal.work.comfort import comfort_of_films
-from clfractal.work.show import Look
 from tests.viewer.panel_harness import make_ui
 from tests.viewer.sessions import BULB, films_of, scene_of, session_on, shown_frame
 

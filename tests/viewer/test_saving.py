@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clfractal import resources
 from clfractal.errors import FileError
+from clfractal.files import resources
 from clfractal.files.png import SCENE_KEY, write_png_pixels
-from clfractal.files.volume import Volume, write_volume
+from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.viewer.saving import (
     SceneSource,

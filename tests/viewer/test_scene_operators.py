@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.engine.prepare import prepare
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.aim import Aim, aimed
@@ -23,7 +24,6 @@ from clfractal.viewer.playing import Player
 from clfractal.viewer.scene_operators import STEREO_MODES, SceneOperators
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
-from clfractal.work.prepare import prepare
 from tests.scenes import STEREO
 from tests.viewer.sessions import BULB, scene_of
 

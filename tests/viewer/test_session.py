@@ -12,6 +12,11 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
+from clfractal.engine.canvas import CHANNELS
+from clfractal.engine.job_films import JobFilms
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare as prepared
+from clfractal.engine.run import run
 from clfractal.errors import DeviceError, SceneError
 from clfractal.scene.model import Scene
 from clfractal.viewer import painting
@@ -19,11 +24,6 @@ from clfractal.viewer import session as sessions_module
 from clfractal.viewer.background import Thumbnail
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.session import Session
-from clfractal.work.canvas import CHANNELS
-from clfractal.work.films import JobFilms
-from clfractal.work.local import LocalExecutor
-from clfractal.work.prepare import prepare as prepared
-from clfractal.work.run import run
 from tests.viewer.sessions import (
     BALL,
     BULB,
@@ -292,7 +292,7 @@ def raising(error: Exception) -> Any:
 def test_without_room_for_passes_all_samples_are_made_at_once(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    from clfractal.work.drawing import Drawing
+    from clfractal.engine.drawing import Drawing
 
     keep, full = (
         Drawing.keep,

@@ -12,13 +12,13 @@ import pytest
 import clfractal
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError, DeviceError
-from clfractal.renderers import volume
+from clfractal.integrators import volume
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Still, Task, Tell, Thumbnail
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.session import Session
-from clfractal.work.local import LocalExecutor
 from tests.calls import counted
 from tests.viewer.sessions import (
     BALL,

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from clfractal import resources
+from clfractal.files import resources
 from clfractal.scene.load import load_scene
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.controls import Controls

@@ -7,13 +7,13 @@ import pytest
 
 from benchmarks.truth.noise import smoothed
 from clfractal.device.select import Device
+from clfractal.engine.canvas import CHANNELS
+from clfractal.engine.prepare import prepare
+from clfractal.engine.show import Look
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.gathering import Gathering
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import Wanted
-from clfractal.work.canvas import CHANNELS
-from clfractal.work.prepare import prepare
-from clfractal.work.show import Look
 from tests.viewer.sessions import BALL, BULB, films_of, planes, scene_of, session_on, shown_frame, wait_for
 
 # The second view has fewer samples, and is finished before the first.

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.optics.view import camera_view
+from clfractal.camera.views import camera_view
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import Extent
 from clfractal.viewer import navigation

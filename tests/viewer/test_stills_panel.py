@@ -17,6 +17,7 @@ from imgui_bundle import imgui
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
+from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import FileError
 from clfractal.files.png import read_png_pixels
 from clfractal.scene.load import load_scene
@@ -33,7 +34,6 @@ from clfractal.viewer.panels.stills import (
     state_text,
 )
 from clfractal.viewer.panels.ui import Ui
-from clfractal.work.local import LocalExecutor
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, headless, make_ui
 

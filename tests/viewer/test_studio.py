@@ -11,10 +11,10 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
+from clfractal.engine.canvas import CHANNELS
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
-from clfractal.work.canvas import CHANNELS
 from tests.pictures import read_picture
 from tests.scenes import STEREO
 from tests.viewer.sessions import BALL, BULB, equal_pictures, films_of, scene_of, wait_for

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
 from clfractal.scene.animation import MAX_FRAMES, Animation, Interpolation, Key, Track
-from clfractal.viewer import timeline as t
+from clfractal.viewer import timeline_edits as t
 
 WAYS: tuple[Any, ...] = get_args(Interpolation)
 

@@ -12,7 +12,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.animation import Animation, Key, Track
 from clfractal.scene.load import load_scene
-from clfractal.viewer import timeline as t
+from clfractal.viewer import timeline_edits as t
 from clfractal.viewer import timeline_view
 from clfractal.viewer.panels import (
     overlay,

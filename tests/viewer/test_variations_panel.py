@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 
 pytest.importorskip("imgui_bundle")
 
+from clfractal.engine.variations import KINDS
+from clfractal.engine.variations import variations as library
 from clfractal.scene.load import check_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.panels import cards, variations
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.panels.variations import COUNT, SPARES, Choice, Draw, shown, taken_over
-from clfractal.work.variations import KINDS
-from clfractal.work.variations import variations as library
 from tests.viewer.panel_clicks import Seen
 from tests.viewer.panel_harness import Stage, make_ui
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from clfractal.viewer.words import counted
+from clfractal.viewer.number_words import counted
 
 
 def test_one_has_no_plural() -> None:

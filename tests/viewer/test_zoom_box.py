@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from clfractal.camera.views import camera_view
 from clfractal.errors import SceneError
-from clfractal.optics.view import camera_view
-from clfractal.renderers.planes import zoom_of
+from clfractal.geometry.planes import zoom_of
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
 from clfractal.formulas.chain import Chain
-from clfractal.renderers.lanes import best_lanes
+from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer

@@ -9,13 +9,8 @@ import numpy as np
 import pyopencl as cl
 import pytest
 
-from clfractal.renderers.transfer import TRANSFER_SIZE
-from clfractal.renderers.volume import (
-    transfer_table,
-    unseen_sample,
-    value_range,
-    volume_record,
-)
+from clfractal.integrators.volume import transfer_table, unseen_sample, value_range, volume_record
+from clfractal.shading.transfer import TRANSFER_SIZE
 from clfractal.voxels.blocks import BLOCK_BYTES, seen_blocks
 from clfractal.voxels.dense import grid_from_dense
 from tests.devices import device

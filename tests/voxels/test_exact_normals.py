@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.renderers.planes import zoom_of
+from clfractal.geometry.planes import zoom_of
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from clfractal.schema.shape import turned_axes

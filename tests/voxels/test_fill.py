@@ -111,7 +111,7 @@ def test_coverage_is_the_share_of_points_inside() -> None:
 
 
 def test_iterations_are_smooth_counts() -> None:
-    from clfractal.renderers import points
+    from clfractal.integrators import points
 
     settings = {"resolution": (24, 20, 17), "value": "iterations", "box": {"size": [3.0, 2.5, 2.0]}}
     scene = volume_scene("hast", 16, store="float", **settings)

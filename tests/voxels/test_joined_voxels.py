@@ -12,9 +12,9 @@ import clfractal
 from clfractal.device.select import has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
-from clfractal.renderers import points
-from clfractal.renderers.plan import make_plan
-from clfractal.renderers.volume import grid_key
+from clfractal.integrators import points
+from clfractal.integrators.plan import make_plan
+from clfractal.integrators.volume import grid_key
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests import scenes

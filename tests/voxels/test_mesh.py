@@ -12,7 +12,7 @@ import trimesh
 
 from clfractal.files.mesh import Mesh
 from clfractal.scene.grid_values import finite_range
-from clfractal.voxels.mesh import extract
+from clfractal.voxels.isosurface import extract
 
 marching_cubes: Any = skimage.measure.marching_cubes
 Doubles = npt.NDArray[np.float64]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from clfractal.cli import run
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 from tests.pictures import read_picture
 from tests.shell import process
 from tests.window.display import Pixels

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clfractal import resources
+from clfractal.files import resources
 from clfractal.scene.load import load_scene
 from clfractal.viewer.autosave import Autosave
 from tests.window.display import Display, Pixels

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from clfractal.cli import run
-from clfractal.commands.shell import Shell
+from clfractal.cli.shell import Shell
 from clfractal.scene.load import load_scene
 from tests.pictures import read_picture
 from tests.window.display import Pixels

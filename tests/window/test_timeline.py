@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from clfractal.engine.frames import at_frame
 from clfractal.scene.load import load_scene
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.timeline_area import HEIGHT, LEFT
-from clfractal.work.frames import at_frame
 from tests.window.display import Display, Pixels
 from tests.window.driver import Window, wait_for
 from tests.window.film import film

@@ -9,7 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.plane import Plane, scaled
+from clfractal.scene.rectangle import Plane, scaled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.schema.shape import Solid
 from clfractal.viewer import plane_moves

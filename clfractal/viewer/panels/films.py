@@ -11,13 +11,13 @@ from imgui_bundle import imgui
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.film_kinds import CONTAINERS
 from clfractal.scene.animation import Animation
-from clfractal.viewer.films import FilmOrder, RenderedFilm
+from clfractal.viewer.film_queue import FilmOrder, RenderedFilm
+from clfractal.viewer.number_words import counted
 from clfractal.viewer.panels import layout, right_dock, theme
 from clfractal.viewer.panels import order_form as form
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.words import counted
 
 PRESETS: dict[str, form.Size | None] = {
     "Scene": None,

@@ -8,7 +8,7 @@ from imgui_bundle import imgui
 
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Link
-from clfractal.formulas.model import BoundFormula, Parameter
+from clfractal.formulas.definition import BoundFormula, Parameter
 from clfractal.formulas.turns import MAX_START
 from clfractal.viewer.panels import formula_library, theme
 from clfractal.viewer.panels import widgets as w

@@ -16,8 +16,8 @@ from imgui_bundle.imgui_color_text_edit import TextEditor
 from clfractal.errors import ClfractalError, FormulaError, Where
 from clfractal.files.document import read_document, read_text_file, write_document
 from clfractal.files.fragments import same
+from clfractal.files.resources import folder
 from clfractal.formulas import catalog
-from clfractal.resources import folder
 from clfractal.scene.formula import FormulaSpec
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w

@@ -8,13 +8,13 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal import resources
+from clfractal.engine.thumbnails import SAMPLES, SIZE
+from clfractal.files import resources
+from clfractal.viewer.number_words import counted
 from clfractal.viewer.panels import cards, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.shelf import Entry, Shelf
-from clfractal.viewer.words import counted
-from clfractal.work.thumbnails import SAMPLES, SIZE
 
 KINDS = {"all": "All", "surface": "Surfaces", "volume": "Volumes", "cut": "Cut planes", "stereo": "Stereo"}
 """What the gallery can be narrowed to, and its words."""

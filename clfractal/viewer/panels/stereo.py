@@ -6,17 +6,17 @@ from functools import lru_cache
 
 import numpy as np
 
+from clfractal.camera.views import View
+from clfractal.engine.comfort import Comfort
 from clfractal.errors import ClfractalError
-from clfractal.optics import stereo as geometry
-from clfractal.optics.view import View
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.stereo import EyeName, Stereo
 from clfractal.schema.base import length, minus
+from clfractal.stereo import eyes as geometry
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
-from clfractal.work.comfort import Comfort
 
 MODES = {
     "split": "Side by side",

@@ -11,8 +11,8 @@ from imgui_bundle import imgui
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import PICTURES
-from clfractal.pictures.formats import Content, check_output
-from clfractal.pictures.outputs import output_files
+from clfractal.images.formats import Content, check_output
+from clfractal.images.outputs import output_files
 from clfractal.scene.parts import MAX_PIXELS, Image
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still

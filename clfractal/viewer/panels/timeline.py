@@ -5,7 +5,8 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from clfractal.scene.animation import Animation
-from clfractal.viewer import timeline, timeline_view
+from clfractal.viewer import timeline_edits as timeline
+from clfractal.viewer import timeline_view
 from clfractal.viewer.panels import theme, timeline_curves, timeline_inspector, timeline_rows
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import clipped

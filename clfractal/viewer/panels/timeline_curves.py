@@ -9,7 +9,8 @@ from imgui_bundle import imgui
 
 from clfractal.scene.animation import Animation, Key
 from clfractal.scene.curves import Values
-from clfractal.viewer import timeline, timeline_view
+from clfractal.viewer import timeline_edits as timeline
+from clfractal.viewer import timeline_view
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.timeline_area import Area, box, diamond

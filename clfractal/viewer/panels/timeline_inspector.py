@@ -8,13 +8,13 @@ from typing import Any, TypeAlias, get_args
 from imgui_bundle import imgui
 
 from clfractal.scene.animation import EASES, MAX_FRAMES, Animation, Interpolation, Key, Track
-from clfractal.viewer import timeline
+from clfractal.viewer import timeline_edits as timeline
 from clfractal.viewer.film_place import movable, value_of
 from clfractal.viewer.panels import metadata, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Change, Scale
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.timeline import NONE, KeyAt, Selection
+from clfractal.viewer.timeline_edits import NONE, KeyAt, Selection
 from clfractal.viewer.timeline_view import TimelineView
 
 EDITED = {

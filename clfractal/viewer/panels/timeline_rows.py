@@ -5,7 +5,8 @@ from __future__ import annotations
 from imgui_bundle import imgui
 
 from clfractal.scene.animation import Animation
-from clfractal.viewer import timeline, timeline_view
+from clfractal.viewer import timeline_edits as timeline
+from clfractal.viewer import timeline_view
 from clfractal.viewer.film_place import value_of
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
@@ -13,7 +14,7 @@ from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.timeline_area import LEFT, Area, box, diamond
 from clfractal.viewer.panels.timeline_inspector import way_menu
 from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.timeline import KeyAt
+from clfractal.viewer.timeline_edits import KeyAt
 from clfractal.viewer.timeline_view import TimelineView
 
 ROW = 22.0

@@ -9,13 +9,13 @@ from typing import Any, Protocol
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.engine.comfort import Comfort
 from clfractal.viewer.display import Shown
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.panels import theme
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
-from clfractal.work.comfort import Comfort
 
 _PICTURE = 200.0
 """Points of the picture's width that are left beside the dock, or else it is put away."""

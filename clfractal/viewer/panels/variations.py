@@ -10,13 +10,7 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.errors import ClfractalError
-from clfractal.scene.load import check_scene
-from clfractal.scene.model import Scene
-from clfractal.viewer.panels import cards, layout, right_dock, theme
-from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.ui import Ui
-from clfractal.work.variations import (
+from clfractal.engine.variations import (
     KINDS,
     STRENGTHS,
     Variation,
@@ -25,7 +19,13 @@ from clfractal.work.variations import (
     small_scene,
     worthwhile,
 )
-from clfractal.work.varied import Kind, Strength
+from clfractal.engine.varied import Kind, Strength
+from clfractal.errors import ClfractalError
+from clfractal.scene.load import check_scene
+from clfractal.scene.model import Scene
+from clfractal.viewer.panels import cards, layout, right_dock, theme
+from clfractal.viewer.panels import widgets as w
+from clfractal.viewer.panels.ui import Ui
 
 COUNT = 12
 SPARES = 6

@@ -1,0 +1,148 @@
+"""How a launch takes its pixels from stage to stage: in waves, through the kernels of a view."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pyopencl as cl
+
+from clfractal.device.kernels import Lease
+from clfractal.device.select import Device
+from clfractal.images.tiles import TILE
+from clfractal.integrators.kernel import (
+    BLOCK,
+    STAGE_NUMBERS,
+    STATE_PADDING,
+    WAVE_NUMBERS,
+    Over,
+    Stage,
+    TileKernel,
+)
+from clfractal.integrators.waves import rays_group, rays_of_item
+
+# Tiles of the largest launch: 1024 of them are a megapixel.
+CAPACITY = 512
+# A wave is the pixels of a launch that are taken from stage to stage at a time: as many as need so many bytes. On a
+# processor the next stage should find them in the caches; a GPU wants many pixels at a time.
+WAVE_BYTES = {"cpu": 24 << 20, "gpu": 512 << 20}
+# Numbers that every kernel is given last, or before those of waves: the packets and samples of a launch, and its mode.
+_SPAN_NUMBERS = 5
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """What one launch renders.
+
+    Attributes:
+        tiles: indices in the view's grid of tiles.
+        packets: first packet of each tile, and the one after the last.
+        samples: first sample of each pixel, and the one after the last.
+        mode: PASS_KEEP and PASS_ADD, as bits.
+        kept_places: of each tile, its number among those that are kept for later passes.
+        slot: which of the sets of buffers the results go into.
+    """
+
+    tiles: npt.NDArray[np.int32]
+    packets: tuple[int, int]
+    samples: tuple[int, int]
+    mode: int
+    kept_places: npt.NDArray[np.int32]
+    slot: int
+
+
+@dataclass(frozen=True, slots=True)
+class Wave:
+    """What is taken from stage to stage at a time.
+
+    Attributes:
+        packets: at most so many: whole tiles, or a part of one. A launch of a kernel without stages is one wave.
+        turns: most rays of a pixel in the queue.
+        sizes: bytes of the buffers that keep its pixels' state, their rays, and what these have met; empty without stages.
+    """
+
+    packets: int
+    turns: int
+    sizes: list[int]
+
+
+def wave_of(kernel: TileKernel, device: Device, capacity: int) -> Wave:
+    """The waves in launches of at most `capacity` tiles."""
+    lanes, per_tile = kernel.plan.lanes, TILE * TILE // kernel.plan.lanes
+    if not kernel.waves:
+        return Wave(capacity * per_tile, 0, [])
+    needs, width = kernel.wave_needs(), np.dtype(kernel.precision).itemsize
+    each = width * lanes * (needs.state + (needs.ray + needs.met) * needs.turns)
+    packets = max(WAVE_BYTES.get(device.info.kind, WAVE_BYTES["cpu"]) // each, 1)
+    if packets >= per_tile:
+        packets = min(packets // per_tile, capacity) * per_tile
+    state = (packets * lanes + STATE_PADDING) * width
+    queue = (packets * lanes * needs.turns + STATE_PADDING) * width
+    return Wave(packets, needs.turns, [state * needs.state, queue * needs.ray, queue * needs.met])
+
+
+def number_count(kernel: TileKernel) -> int:
+    """How many numbers a launch sets."""
+    return _SPAN_NUMBERS + (len(WAVE_NUMBERS) + len(STAGE_NUMBERS) if kernel.waves else 0)
+
+
+def group_of(over: Over, lanes: int, group: int) -> tuple[int, ...]:
+    """The size of a stage's work-groups, of which those over pixels have `group` work-items."""
+    if over == "rays":
+        return rays_group(lanes)
+    return (group, 1) if over == "pixels" else (group,)
+
+
+class Stages:
+    """The kernels of a view, ready to be launched."""
+
+    def __init__(self, device: Device, kernel: TileKernel, wave: Wave, group: int, kernels: Lease) -> None:
+        self.device, self.kernel, self.wave, self.group = device, kernel, wave, group
+        self._kernels = kernels
+        self._stages: dict[tuple[int, int], list[Stage]] = {}
+
+    def enqueue(self, span: Span, arguments: Sequence[Any]) -> tuple[cl.Event, cl.Event]:
+        """Enqueues all kernels of a launch; gives the first one's event and the last one's.
+
+        Args:
+            span: what is rendered.
+            arguments: of every kernel, up to the numbers of the launch.
+        """
+        if span.samples not in self._stages:
+            self._stages[span.samples] = list(self.kernel.stages(span.samples))
+        per_tile = TILE * TILE // self.kernel.plan.lanes
+        most = max(self.wave.packets // per_tile, 1)
+        events = [
+            self._enqueue(stage, span, range(first, min(first + most, len(span.tiles))), arguments)
+            for first in range(0, len(span.tiles), most)
+            for stage in self._stages[span.samples]
+        ]
+        return events[0], events[-1]
+
+    def _enqueue(self, stage: Stage, span: Span, tiles: range, arguments: Sequence[Any]) -> cl.Event:
+        lanes, (first, end) = self.kernel.plan.lanes, span.packets
+        kernel = self._kernels.kernel(stage.kernel)
+        group = self._kernels.group(stage.kernel, group_of(stage.over, lanes, self.group))
+        numbers = [first, end, *span.samples, span.mode]
+        size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
+        if self.kernel.waves:
+            wave = (end - first) * len(tiles) * lanes
+            sent_by = self._blocks(span, len(tiles)) if stage.of == "blocks" else wave
+            rays = sent_by * stage.turns
+            share = rays_of_item(lanes, rays, self.device.info.compute_units)
+            numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
+            numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
+            if stage.over != "pixels":
+                each = group[0] * (share if stage.over == "rays" else lanes)
+                size = (-(-rays // each) * group[0],)
+        kernel.set_args(*arguments, *numbers)
+        return cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
+
+    def _blocks(self, span: Span, tiles: int) -> int:
+        """Blocks of pixels of which the launch has any."""
+        packets = BLOCK * BLOCK // self.kernel.plan.lanes
+        first, end = span.packets
+        return ((end - 1) // packets - first // packets + 1) * tiles

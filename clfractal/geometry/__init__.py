@@ -1,0 +1,1 @@
+"""What a scene has beside its formula, as kernels read it: objects, joined solids, planes, water."""

@@ -1,0 +1,153 @@
+"""Films that lie on disk while they are rendered."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
+from clfractal.files.journal import Journal
+from clfractal.images.film import Film, in_memory
+from clfractal.images.provenance import Provenance, RenderDevice
+from clfractal.images.tiled import Bands, Floats, check_tile
+from clfractal.images.tiles import TILE, Region, TileGrid
+
+
+class JournalFilm:
+    """A film whose tiles are kept in a journal file: for resuming, and for pictures larger than memory.
+
+    It keeps no pixel in memory; `bands` reads one row of tiles at a time. See `Film` for the header.
+
+    Args:
+        path: the journal, `OUT.partial` by custom.
+        identity: JSON values that say what is rendered; a journal is resumed only if all are equal. The
+            picture's size, region and channels are added.
+        resume: whether to continue an earlier journal (if there is none, a new one is begun).
+        also: other identities whose journals may be continued.
+
+    Raises:
+        SceneError: an unknown channel name.
+        FileError: see `Journal.create` and `Journal.resume`.
+    """
+
+    def __init__(
+        self,
+        path: str | Path,
+        identity: Mapping[str, Any],
+        channels: Sequence[str] = DEFAULT_CHANNELS,
+        display: tuple[int, int] = (1, 1),
+        region: Region | None = None,
+        header: Mapping[str, Any] | None = None,
+        *,
+        resume: bool = False,
+        also: Sequence[Mapping[str, Any]] = (),
+    ) -> None:
+        self.channels: tuple[str, ...] = check_channels(channels)
+        self.display = display
+        self.region = region or Region(0, 0, *display)
+        if not self.region.inside(*display):
+            raise ValueError(f"{self.region} is not inside a picture of {display[0]} x {display[1]}")
+        self.grid = TileGrid(self.region)
+        self.header: dict[str, Any] = dict(header or {})
+        x, y, width, height = self.region.x, self.region.y, self.region.width, self.region.height
+        shape = {"size": list(display), "region": [x, y, width, height]}
+        whole, tiles = {**identity, **shape}, self.grid.count
+        if resume:
+            others = [{**each, **shape} for each in also]
+            self.journal = Journal.resume(path, whole, self.channels, tiles, others)
+        else:
+            self.journal = Journal.create(path, whole, self.channels, tiles)
+        self.provenance = self._noted_provenance()
+
+    def tell(self, key: str, value: Any) -> None:
+        """Adds an entry to the header."""
+        self.header[key] = value
+
+    @property
+    def done(self) -> npt.NDArray[np.bool_]:
+        """For each tile, whether it is finished."""
+        return self.journal.done
+
+    def put(self, tile_index: int, array: Floats, render_device: RenderDevice | None = None) -> None:
+        """Stores a tile: float32 of shape (channels, rows, columns).
+
+        Args:
+            render_device: the device that made it, where several render the picture.
+
+        Raises:
+            FileError: the journal cannot be written (a full disk).
+        """
+        check_tile(array, self.grid.tile(tile_index), self.channels)
+        number = 0
+        if render_device is not None:
+            number = self.provenance.number(render_device)
+            if number not in self.journal.notes:
+                self.journal.note(number, render_device.as_data())
+        self.journal.append(tile_index, array, number)
+        self.provenance.of_tiles[tile_index] = number
+
+    def put_tiles(
+        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+    ) -> None:
+        """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
+
+        Args:
+            render_device: as for `put`.
+
+        Raises:
+            FileError: the journal cannot be written (a full disk).
+        """
+        for index, array in zip(indices.tolist(), film, strict=True):
+            tile = self.grid.tile(index)
+            top, left = tile.y % TILE, tile.x % TILE
+            self.put(index, array[:, top : top + tile.height, left : left + tile.width], render_device)
+
+    def bands(self) -> Bands:
+        """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows).
+
+        Raises:
+            FileError: the journal cannot be read, or was damaged after it was written.
+        """
+        grid, region = self.grid, self.region
+        fills = np.array([CHANNELS[name].fill for name in self.channels], dtype=np.float32)
+        for row in range(grid.rows):
+            first = grid.tile(row * grid.columns)
+            band = np.empty((len(self.channels), first.height, region.width), dtype=np.float32)
+            band[:] = fills[:, None, None]
+            for index in range(first.index, first.index + grid.columns):
+                if self.done[index]:
+                    tile = grid.tile(index)
+                    left = tile.x - region.x
+                    pixels = self.journal.tile(index)[:, : tile.height, : tile.width]
+                    band[:, :, left : left + tile.width] = pixels
+            yield first.y, dict(zip(self.channels, band, strict=True))
+
+    def _noted_provenance(self) -> Provenance:
+        """Those of an earlier run."""
+        found, notes = Provenance(self.grid.count), self.journal.notes
+        last = max([0, *notes, int(self.journal.provenance.max(initial=0))])
+        for number in range(1, last + 1):
+            about = notes.get(number, {"index": f"device {number}"})
+            found.known.append(RenderDevice(*(str(about.get(key, "")) for key in ("index", "name", "key"))))
+        found.of_tiles[:] = self.journal.provenance
+        return found
+
+    def to_film(self) -> Film:
+        """All of it in memory; missing tiles have their channels' fill values."""
+        return in_memory(self)
+
+    def close(self) -> None:
+        """Closes the journal and leaves it for a later run."""
+        self.journal.close()
+
+    def discard(self) -> None:
+        """Removes the journal: the outputs are written."""
+        self.journal.discard()
+
+    def __repr__(self) -> str:
+        size = f"{self.display[0]}x{self.display[1]}"
+        return f"<JournalFilm {self.journal.path} {size}, {self.done.mean():.0%} done>"

@@ -1,0 +1,144 @@
+"""Where the pixels of a wave keep what they carry from stage to stage: what is kept, and who needs it.
+
+`state.h` keeps and recalls it by the names of PARTS. Where it is kept is data of a launch, so that programs know
+nothing of what a scene has, and what that does not need takes no memory.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import accumulate
+
+from clfractal.geometry.planes import has_faces
+from clfractal.integrators.carried import (
+    AOVS,
+    ASKED_LIGHT,
+    COUNTERS,
+    FACE,
+    FACET,
+    FILM_SAMPLE,
+    FLIGHT,
+    HALT,
+    LAMP_BEFORE,
+    LAYERS,
+    LENS_SAMPLE,
+    MATTES,
+    PARTS_OF_LIGHT,
+    PATH,
+    PIXEL,
+    RELIEF,
+    SIGHTING,
+    SPOT_SEEN,
+    SPOT_THING,
+    START,
+    TOUCH,
+    WITHIN,
+)
+from clfractal.integrators.passes import has_mattes, has_parts
+from clfractal.integrators.plan import Plan
+from clfractal.integrators.records import bounces
+from clfractal.integrators.waves import (
+    air_turns,
+    finds_materials,
+    has_cones,
+    has_lens,
+    has_media,
+    has_wide_lights,
+    meets_lights,
+)
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.model import Scene
+from clfractal.shading.maps import asked_maps, bump_numbers, has_bump, has_glass, has_participating_media
+from clfractal.shading.materials import matter_numbers
+
+
+@dataclass(frozen=True, slots=True)
+class Part:
+    """Something of the state: numbers of one, and how many a scene needs."""
+
+    name: str
+    numbers: int
+    many: Callable[[Scene, Plan], int]
+
+
+def along_paths(scene: Scene) -> bool:
+    """Whether light is followed along paths."""
+    return isinstance(scene.lighting, PathLighting)
+
+
+def _goes_on(scene: Scene) -> bool:
+    return along_paths(scene) or bounces(scene) > 0
+
+
+def _tells_things(scene: Scene, plan: Plan) -> bool:
+    """Whether spots know more than how they look."""
+    by_quantity = scene.coloring.by not in ("solid", "normal", "iterations")
+    return by_quantity or bool(scene.objects) or has_mattes(plan) or has_faces(scene)
+
+
+def normal_count(scene: Scene) -> int:
+    """Normals over which a pixel's shading is averaged."""
+    renderer = scene.surface
+    if not renderer.normal_of_points:
+        return renderer.used_points.count
+    return 8 if renderer.normal == "eight_triangles_shading" else 1
+
+
+PARTS = (
+    Part("FILM_SAMPLE", FILM_SAMPLE.numbers, lambda scene, plan: 1),
+    Part("LENS_SAMPLE", LENS_SAMPLE.numbers, lambda scene, plan: int(has_lens(scene) or plan.moving)),
+    Part("SIGHTING", SIGHTING.numbers, lambda scene, plan: 1),
+    Part("COUNTERS", COUNTERS.numbers, lambda scene, plan: 1),
+    Part("SUMS", PIXEL.numbers, lambda scene, plan: 1),
+    Part("START", START.numbers, lambda scene, plan: int(has_cones(scene, plan))),
+    Part("TOUCH", TOUCH.numbers, lambda scene, plan: int(scene.surface.used_points.count > 1)),
+    # The first spot, and the one after the last bounce.
+    Part("SPOT_SEEN", SPOT_SEEN.numbers, lambda scene, plan: 1 + _goes_on(scene)),
+    Part(
+        "SPOT_THING",
+        SPOT_THING.numbers,
+        lambda scene, plan: (1 + _goes_on(scene)) * _tells_things(scene, plan),
+    ),
+    Part("FACET", FACET.numbers, lambda scene, plan: normal_count(scene) if normal_count(scene) > 1 else 0),
+    Part("PATH", PATH.numbers, lambda scene, plan: int(_goes_on(scene))),
+    Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
+    Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
+    Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_participating_media(scene))),
+    Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
+    # What rays to wide lights have brought, and lights that are before the spot.
+    Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),
+    Part("LAMP_BEFORE", LAMP_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),
+    Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
+    Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
+    # What the formula was asked for the present spot's material; and the same around it, with the normal and escape count
+    # there, for the slopes of its material's relief (`kernels/shading/bump_places.h`).
+    Part("ASKED", 1, lambda scene, plan: len(asked_maps(scene))),
+    Part("BESIDE", 1, lambda scene, plan: bump_numbers(scene)),
+    # The present spot's material, where one has to be found.
+    Part("MATTER", matter_numbers(), lambda scene, plan: int(finds_materials(scene))),
+    Part("RELIEF", RELIEF.numbers, lambda scene, plan: int(has_bump(scene))),
+    Part("FACE", FACE.numbers, lambda scene, plan: int(has_faces(scene))),
+    Part("LAYERS", LAYERS.numbers, lambda scene, plan: int(bool(scene.cut_planes))),
+    Part("AOVS", AOVS.numbers, lambda scene, plan: int(has_parts(plan))),
+    Part("PARTS", PARTS_OF_LIGHT.numbers, lambda scene, plan: int(has_parts(plan))),
+    Part("MATTES", MATTES.numbers, lambda scene, plan: int(has_mattes(plan))),
+)
+
+
+def state_places(scene: Scene, plan: Plan) -> list[int]:
+    """For each of PARTS the first of its numbers among those of a pixel; -1 where the scene needs none."""
+    counts = [part.many(scene, plan) * part.numbers for part in PARTS]
+    return [
+        first if count else -1 for first, count in zip(accumulate(counts, initial=0), counts, strict=False)
+    ]
+
+
+def state_numbers(scene: Scene, plan: Plan) -> int:
+    """Numbers of a pixel that are kept between stages."""
+    return sum(part.many(scene, plan) * part.numbers for part in PARTS)
+
+
+def state_text() -> str:
+    """The numbers of PARTS, for C."""
+    return "".join(f"#define STATE_{part.name} {number}\n" for number, part in enumerate(PARTS))

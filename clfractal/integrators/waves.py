@@ -1,0 +1,287 @@
+"""The order of the surface renderer's stages: which kernels a launch has, and what each marches or makes.
+
+Rays of a purpose are sent by one stage, marched by another, which knows the formula, and read by a third. A launch is
+
+    [send_cones  march]  and for each sample
+
+    begin_shots  march  find_spots (or send_points  march  join_points)  [color_spots]  march  light_spots
+
+with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[send_to_lights]`
+after the spots and `[meet_lights] [gather_light]` before `light_spots` where direct light comes from more than single
+directions, with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays
+that look for a spot; each mirror adds what follows `begin_shots` but for the points.
+With `lighting.mode: path` in the place of the last two
+
+    [find_materials]  scatter_paths  march  gather_paths
+
+ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
+those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
+With media that scatter light `cross_media` stands before `scatter_paths` and `end_paths`, and with clouds `pass_clouds`
+after the former. See docs/engineering/shots.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from clfractal.geometry.object_grids import clouds_of
+from clfractal.geometry.planes import has_faces
+from clfractal.geometry.solids import joins_smoothly
+from clfractal.integrators.kernel import MET_NUMBERS, Over, Stage
+from clfractal.integrators.plan import Plan
+from clfractal.integrators.records import bounces, hemisphere_rays, light_rays
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import RectangleLight, SetLight, SphereLight
+from clfractal.scene.model import Scene
+from clfractal.scene.parts import PerspectiveCamera
+from clfractal.shading.maps import (
+    MappedMaterials,
+    asked_maps,
+    bump_numbers,
+    has_glass_set,
+    has_participating_media,
+)
+from clfractal.shading.set_lights import single_lights
+
+# What a march is after, as in `kernels/integrators/march/rays.h`.
+GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
+# Rays that a work-item marches: a packet of lanes, which take them in turn, or one lane.
+PACKET_RAYS, LANE_RAYS = 1024, 4
+_LANE_GROUP = 64
+
+
+def rays_of_item(lanes: int, rays: int, compute_units: int) -> int:
+    """Rays that a work-item marches: fewer where there are too few for all cores."""
+    if lanes == 1:
+        return LANE_RAYS
+    share = rays // (3 * max(compute_units, 1))
+    return min(max(share // lanes, 1) * lanes, PACKET_RAYS)
+
+
+def rays_group(lanes: int) -> tuple[int, ...]:
+    """Work-items of a group that marches rays."""
+    return (_LANE_GROUP if lanes == 1 else 1,)
+
+
+def asks_formula(scene: Scene) -> bool:
+    """Whether a quantity that chooses colours, or a material's, is found by asking the formula."""
+    return scene.coloring.by in ("thickness", "layer_distance", "trap") or bool(
+        asked_maps(scene) or bump_numbers(scene)
+    )
+
+
+def has_cones(scene: Scene, plan: Plan) -> bool:
+    """Whether a cone for each block of pixels goes before the rays: those through a lens, or of a view that moves, have no
+    common one."""
+    return scene.surface.search == "distance" and not has_lens(scene) and not plan.moving
+
+
+def has_lens(scene: Scene) -> bool:
+    """Whether rays leave a lens."""
+    return isinstance(scene.camera, PerspectiveCamera) and scene.camera.lens_radius > 0
+
+
+def meets_objects(scene: Scene) -> bool:
+    """Whether rays meet objects beside the set."""
+    clouds = clouds_of(scene)
+    return any(name not in scene.joined and each not in clouds for name, each in scene.objects.items())
+
+
+def has_media(scene: Scene) -> bool:
+    """Whether anything scatters paths on their way: clouds, or glass."""
+    along_paths = isinstance(scene.lighting, PathLighting)
+    return has_participating_media(scene) or (along_paths and bool(clouds_of(scene)))
+
+
+def finds_materials(scene: Scene) -> bool:
+    """Whether materials of spots differ from place to place, or parts of several are mixed: else each thing has its own."""
+    if not isinstance(scene.lighting, PathLighting):
+        return False
+    return bool(MappedMaterials(scene).maps) or has_faces(scene) or joins_smoothly(scene)
+
+
+def met_numbers(scene: Scene) -> int:
+    """Numbers that are kept of what a ray met (`kernels/integrators/march/queue.h`)."""
+    return MET_NUMBERS + bool(scene.joined) + 2 * joins_smoothly(scene)
+
+
+def light_turns(scene: Scene) -> int:
+    """Rays that leave a spot for its light; along paths they are sent by a stage of their own."""
+    if isinstance(scene.lighting, PathLighting):
+        return 0
+    rays = hemisphere_rays(scene)
+    to_set = max((light.used_rays for light in scene.lights if isinstance(light, SetLight)), default=0)
+    return rays.cosine + rays.map + len(single_lights(scene)) * light_rays(scene) + to_set
+
+
+def meets_lights(scene: Scene) -> bool:
+    """Whether paths of direct light may meet lights: those that have a place and a size."""
+    if isinstance(scene.lighting, PathLighting):
+        return False
+    return any(isinstance(light, (SphereLight, RectangleLight, SetLight)) for light in scene.lights)
+
+
+def has_wide_lights(scene: Scene) -> bool:
+    """Whether direct light comes from more than single directions: from lights with a size, or out of the hemisphere."""
+    if isinstance(scene.lighting, PathLighting):
+        return False
+    rays = hemisphere_rays(scene)
+    return rays.cosine + rays.map > 0 or any(light.has_size for light in scene.lights)
+
+
+def air_turns(scene: Scene) -> int:
+    """Rays that leave the fog before the first spot: one to each light."""
+    fog = scene.fog
+    return (
+        len(single_lights(scene)) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
+    )
+
+
+def most_turns(scene: Scene) -> int:
+    """The most rays that a pixel sends for one purpose."""
+    after = max(light_turns(scene), 1) + air_turns(scene)
+    # A path that is within a set of glass has a ray of another kind.
+    return max(scene.surface.used_points.count, after, 1 + int(has_glass_set(scene)))
+
+
+# What work-items do of kernels that are not launched over pixels.
+OVER: dict[str, Over] = {
+    "march_rays": "rays",
+    "march_points": "rays",
+    "step_rays": "rays",
+    "march_inside": "rays",
+    "walk_inside": "rays",
+    "send_cones": "packets of rays",
+    "look_at_surfaces": "packets of rays",
+    "look_at_points": "packets of rays",
+    "look_where_steps_end": "packets of rays",
+    "look_inside_set": "packets of rays",
+    "look_where_walks_end": "packets of rays",
+    "meet_objects": "packets of rays",
+    "look_at_objects": "packets of rays",
+}
+# Packets look at surfaces where they march.
+OF_SINGLE_LANES = (
+    "look_at_surfaces",
+    "look_at_points",
+    "look_where_steps_end",
+    "look_inside_set",
+    "look_where_walks_end",
+)
+
+
+def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
+    """The kernels of `march.cl`, `march_points.cl` or `march_steps.cl`: packets look at surfaces where they march."""
+    if scene.surface.search == "steps":
+        found = ("step_rays", "look_where_steps_end")
+    elif scene.surface.used_points.count > 1:
+        found = ("march_points", "look_at_points")
+    else:
+        found = ("march_rays", "look_at_surfaces")
+    return found if plan.lanes == 1 else found[:1]
+
+
+def inside_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
+    """The kernels of `glass.cl`, or of `random_walk.cl` where anything scatters light on the way."""
+    participating = has_participating_media(scene)
+    found = ("walk_inside", "look_where_walks_end") if participating else ("march_inside", "look_inside_set")
+    return found if plan.lanes == 1 else found[:1]
+
+
+def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterator[Stage]:
+    """The stages of a launch for samples from the first up to the second."""
+    cones = has_cones(scene, plan)
+    if cones and samples[0] < samples[1]:
+        yield Stage("send_cones", OVER["send_cones"], 1, of="blocks")
+        march = march_kernels(scene, plan)[0]
+        yield Stage(march, OVER[march], 1, {"goal": GOAL_CONE}, of="blocks")
+    # A launch without samples only writes what pixels have.
+    for sample in range(*samples):
+        yield from _sample(scene, sample, plan, cones=cones)
+
+
+def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[Stage]:
+    marching = march_kernels(scene, plan)
+    points, after = scene.surface.used_points.count, light_turns(scene)
+    steps = scene.surface.search == "steps"
+
+    def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
+        return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
+
+    beside = meets_objects(scene)
+    met, looked = (("meet_objects",), ("look_at_objects",)) if beside else ((), ())
+
+    def of_objects(kernels: tuple[str, ...], turns: int) -> Iterator[Stage]:
+        return (Stage(kernel, OVER[kernel], turns) for kernel in kernels)
+
+    yield stage("begin_shots", int(cones))
+    for bounce in range(bounces(scene) + 1):
+        turns = 1
+        within = bounce > 0 and has_glass_set(scene)
+        # (Of a pixel with points only a face asks whether an object is before it.)
+        if points == 1 or bounce > 0 or has_faces(scene):
+            yield from of_objects(met, 1 + within)
+        if has_faces(scene):
+            yield stage("find_faces", bounce=bounce)
+        if points > 1 and bounce == 0:
+            yield from _marched(marching, 1, GOAL_TOUCH)
+            turns = points
+            yield stage("send_points", 1)
+            yield from of_objects(met, turns)
+            yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
+        else:
+            yield from _marched(marching, 1, GOAL_SURFACE)
+            if within:
+                yield from _marched(inside_kernels(scene, plan), 1, GOAL_SURFACE, bounce)
+        yield from of_objects(looked, turns + within)
+        kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
+        yield stage(kernel, turns, bounce=bounce, next_turns=after)
+        if has_wide_lights(scene):
+            yield stage("send_to_lights", bounce=bounce, next_turns=after)
+        air, paths = air_turns(scene) if bounce == 0 else 0, isinstance(scene.lighting, PathLighting)
+        if air > 0:  # behind the rays for light
+            yield stage("send_air", next_turns=1 if paths else after)
+        if asks_formula(scene):
+            yield stage("color_spots", bounce=bounce)
+        if scene.cut_planes and bounce == 0 and not paths:
+            yield stage("find_planes")
+        if scene.glow is not None:
+            yield stage("add_glow", bounce=bounce)
+        if paths:
+            if has_media(scene):
+                yield stage("cross_media", 1, bounce=bounce)
+            if finds_materials(scene):
+                yield stage("find_materials", bounce=bounce)
+            yield stage("scatter_paths", 1, bounce=bounce)
+            if clouds_of(scene):
+                yield stage("pass_clouds", bounce=bounce)
+            if scene.cut_planes and bounce == 0:
+                yield stage("find_planes")
+            yield from of_objects(met, 1 + air)
+            yield from _marched(marching, 1 + air, GOAL_SHADOW)
+            if air > 0:
+                yield stage("gather_air", 1 + air, next_turns=1)
+            yield stage("gather_paths", 1 + air, bounce=bounce)
+            continue
+        if after + air > 0:
+            yield from of_objects(met, after + air)
+            yield from _marched(marching, after + air, GOAL_SHADOW)
+        if air > 0:
+            yield stage("gather_air", after + air, next_turns=after)
+        if meets_lights(scene):
+            yield stage("meet_lights", bounce=bounce)
+        if has_wide_lights(scene):
+            yield stage("gather_light", after + air, bounce=bounce)
+        yield stage("light_spots", after + air, bounce=bounce)
+    if isinstance(scene.lighting, PathLighting):
+        yield from of_objects(met, 1)
+        yield from _marched(marching, 1, GOAL_SHADOW)
+        if has_media(scene):
+            yield stage("cross_media", 1, bounce=bounces(scene) + 1)
+        yield stage("end_paths", 1, bounce=bounces(scene) + 1)
+
+
+def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
+    yield Stage(kernels[0], OVER[kernels[0]], turns, {"goal": goal, "bounce": bounce})
+    if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
+        yield Stage(kernels[1], OVER[kernels[1]], turns)

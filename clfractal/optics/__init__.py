@@ -1,1 +1,0 @@
-"""Where eyes are and what they see: view planes, frusta, parallax."""

@@ -1,0 +1,99 @@
+// Rays from the eye.
+#include "geometry/objects.h"
+#include "integrators/state.h"
+
+// Whether a surface is one that marches find: of the set or a part of it, and not of an object beside it.
+INLINE mask of_the_set(real object, world w) {
+    mask found = equal(object, R(0.0));
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (w.objects[i].kind == OBJECT_JOINED) found |= equal(object, (real)((scalar)(i + 1)));
+    }
+    return found;
+}
+
+// The number of an object's material, or the set's.
+INLINE real object_material(real object, world w) {
+    real number = (real)((scalar)w.settings->set_material);
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        const mask there = equal(object, (real)((scalar)(i + 1)));
+        number = pick(there, (real)((scalar)w.objects[i].material), number);
+    }
+    return number;
+}
+
+INLINE real spot_material(const spot *here, world w) { return object_material(here->object, w); }
+
+// The sums of the packet's pixels before this sample.
+INLINE pixel sums_before(stage s, const place_in_pass *here) {
+    if (s.sample == s.span.first) return pixel_before(s.span, here);
+    STATE_KEPT(s, pixel, p, STATE_SUMS);
+    return p;
+}
+
+CALLED ray eye_ray(const camera_sample *a, view_record view) { return camera_ray(a->x, a->y, a->lens_x, a->lens_y, a->time, view); }
+
+INLINE camera_sample camera_sample_of(stage s, const place_in_pass *here, mask wanted) {
+    real across, below;
+    sample_offset(s.span, &here->at, s.sample, &across, &below);
+    camera_sample a = {number_of(wanted), here->at.x + across, here->at.y + below, across * across + below * below, R(0.0), R(0.0), R(0.0)};
+    sample_of_lens(&here->at, s.sample, (uint)s.span.sampling->seed, s.span.view, &a.lens_x, &a.lens_y, &a.time);
+    return a;
+}
+
+// Sends a ray for the part of its way that planes which cut the set and the bounding sphere leave, from `free` on: nothing should be before.
+INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world w) {
+    real face;
+    wanted &= planes_cut(&r, &face, w.planes);
+    wanted &= ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
+    lanes_store(r.near, s.q.rays + RAY_START * s.q.stride + turn * s.q.wave + s.slot);
+    r.near = fmax(r.near, free);
+    queue_send(s.q, turn, s.slot, r, wanted);
+}
+
+// What has to be known of a ray: which surface it meets, or only whether it meets one.
+#define WHICH R(0.0)
+#define WHETHER ((real)(REAL_LARGEST))
+#define GOES_PAST R(-1.0)
+
+// Sends a ray for all that it may meet. Its march ends at the nearest object, and is left out where that is nearer than `enough`, unless the
+// ray GOES_PAST: see `meet_objects`.
+INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
+    if (s.q.objects) {
+        __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
+        lanes_store(pick(wanted, r.far, R(-1.0)), at + RAY_OBJECT * s.q.stride);
+        lanes_store(OBJECT_AWAITED, at + RAY_OBJECT_NUMBER * s.q.stride);
+        lanes_store(enough, at + RAY_OBJECT_PLACE * s.q.stride);
+    }
+    send_to_set(s, turn, r, free, wanted, w);
+}
+
+// The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
+INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
+    so_far->on_path = wanted;
+    so_far->through = color_of(R(1.0), R(1.0), R(1.0));
+    so_far->seen = color_of(R(0.0), R(0.0), R(0.0));
+    if (s.bounce == 0) return r;
+    STATE_RECALL(s, *so_far, STATE_PATH);
+    r.origin = so_far->origin;
+    r.direction = so_far->direction;
+    r.footprint = so_far->footprint;
+    r.spread = so_far->spread;
+    return r;
+}
+
+// Whether all paths of a packet ended at an earlier spot, and no light that they asked for is awaited: nothing is left to do for them.
+// (What is kept says so from the second bounce on, and rays that are not sent stay so.)
+INLINE int paths_are_over(stage s) {
+    if (s.bounce < 2) return 0;
+    // Of whole structs too much would be read.
+    path so_far;
+    const int on_path = s.at[STATE_PATH] + (int)(&so_far.on_path - (real *)&so_far);
+    const int found = s.at[STATE_SPOT_SEEN] + SPOT_SEEN_NUMBERS, awaited = s.at[STATE_ASKED_LIGHT];
+    const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
+    mask left = less(R(1.0), R(0.0));
+    for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
+    if (KEEPS(s, STATE_HALT)) left |= ~equal(lanes_load(state_part(s, STATE_HALT)), R(0.0));
+    return !any_lane(left);
+}
+// The head of a stage along paths: packets end whose paths are over.
+#define PATH_STAGE_BEGINS(name, data) STAGE_BEGINS(name, data); if (paths_are_over(name)) return

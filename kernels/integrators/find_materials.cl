@@ -1,0 +1,34 @@
+// Entry point: the materials of spots, where a scene has several, or one that differs from place to place. It knows no formula.
+#include "integrators/stages.h"
+#include "integrators/spot.h"
+#include "shading/phase.h"
+#include "shading/flights.h"
+#include "shading/media.h"
+#include "shading/matter.h"
+#include "shading/bump_places.h"
+#include "shading/maps.h"
+#include "shading/material_at.h"
+#include "shading/bump.h"
+
+// Keeps the numbers of a path's present spot, and the slope of its relief.
+STAGE(find_materials) {
+    STAGE_BEGINS(s, w);
+    if (paths_are_over(s)) return;
+    spot here = spot_kept(s, bounce);
+    if (!any_lane(mask_of(here.found))) return;
+    const camera_sample a = camera_sample_kept(s);
+    path so_far;
+    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    mask emerges = less(R(1.0), R(0.0));
+    if (HAS(w, SUBSURFACE)) {
+        const carried with = carried_kept(s);
+        emerges = path_emerges(bounce, &with, &here, w);
+    }
+    here.normal = vec_pick(emerges, here.normal, facing(here.normal, direction));
+    if (!is_colored_at_once(w.material)) here.tint = tint_of(&here, w);
+    const pbr p = pbr_found(s, &here, w);
+    matter_keep(s, &p);
+    if (!KEEPS(s, STATE_RELIEF)) return;
+    const relief slope = relief_at(s, &here, w);
+    STATE_KEEP(s, slope, STATE_RELIEF);
+}

@@ -1,0 +1,12 @@
+// What stages include that bring light from sky and lights with a size.
+#include "integrators/stages.h"
+#include "shading/environment.h"
+#include "shading/sky.h"
+#include "shading/phase.h"
+#include "integrators/spot.h"
+#include "shading/set_lights.h"
+#include "shading/light_places.h"
+#include "integrators/secondary.h"
+#include "shading/fog.h"
+#include "shading/look.h"
+#include "integrators/lit.h"

@@ -1,0 +1,10 @@
+// What texts of pictures include, whether they know a formula or not.
+#include "formulas/numbers/real.h"
+#include "device/vectors.h"
+#include "structs.h"
+#include "integrators/camera.h"
+#include "integrators/sampling.h"
+#include "shading/shade.h"
+#include "integrators/tiles.h"
+#include "integrators/pixel.h"
+#include "geometry/planes.h"

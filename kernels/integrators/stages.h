@@ -1,0 +1,3 @@
+// What all stages include that know no formula.
+#include "integrators/pictures.h"
+#include "integrators/eye.h"

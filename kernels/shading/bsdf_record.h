@@ -1,0 +1,29 @@
+// A material at a spot: `pbr`, generated from clfractal/shading/materials.py, and made ready to scatter.
+#include "shading/bsdf_glass.h"
+#include "pbr.h"
+
+// A material at a spot, ready to scatter.
+typedef struct {
+    vec side, up, normal;   // the frame of all lobes ...
+    vec out;                // ... and in it the direction to the viewer
+    color body, metal, edge, gloss;   // diffuse colour; a metal's reflectance straight on and its tint at the edge; tint of a dielectric's
+    real metalness, rough_body, rough, alpha, ior, root;   // ior and square root of the reflectance of the dielectric's boundary
+    color coat_tint;
+    real coat, coat_rough, coat_alpha, coat_ior, coat_root, coat_albedo;
+    color fuzz;
+    real fuzz_rough, fuzz_albedo;
+    real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
+    real dielectric;          // part of the surface that has a body
+    mask seen;                // whether the viewer is over the surface
+    int relief;               // whether the normal is that of a relief; see bsdf_bumped.h
+    vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each
+    real level;               // cosine between the normals
+    glass clear;
+    real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
+    mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
+    real bare;                // part of the body that is none of a medium
+    color below; real by_below; // what goes below the boundary, over the probability of choosing that, the last part of all choices
+} bsdf;
+
+INLINE real alpha_of(real roughness) { return fmax(roughness * roughness, SMOOTHEST); }
+INLINE real luminance(color c) { return R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b; }

@@ -1,0 +1,304 @@
+"""Devices that do not answer: they are left out, the others do their tiles, and what they make too late is not used."""
+
+from __future__ import annotations
+
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import deque
+from collections.abc import Generator, Iterable, Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clfractal.device.cancel import CancelToken
+from clfractal.device.select import Device, choose
+from clfractal.engine import sharing
+from clfractal.engine.engine import Engine
+from clfractal.engine.job import Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import Result, WorkItem
+from clfractal.engine.several import SeveralExecutor
+from clfractal.engine.sharing import Shared
+from clfractal.errors import DeviceError
+from clfractal.files.exr import read_exr
+from clfractal.images.film import Film
+from tests.engine.offers import Clock, offer
+from tests.engine.small_pictures import SCENE, same
+from tests.halves import halves_of
+from tests.long_renders import PROMISE_SECONDS
+from tests.shell import environment
+
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
+
+
+@dataclass
+class Hang:
+    """How a device hangs: after so many tiles, until it is freed."""
+
+    after: int = 10
+    began: threading.Event = field(default_factory=threading.Event)
+    freed: threading.Event = field(default_factory=threading.Event)
+    ended: threading.Event = field(default_factory=threading.Event)
+
+
+class Hanging(LocalExecutor):
+    """A device that stops to answer, with tiles that it has taken; its thread waits as one that is in a driver."""
+
+    hang: Hang
+
+    def execute(
+        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+    ) -> Generator[Result]:
+        hang, left = self.hang, self.hang.after
+        try:
+            for result in super().execute(job, items, token):
+                left -= len(result.tiles)
+                if left <= 0:
+                    hang.began.set()
+                    hang.freed.wait()
+                yield result
+        finally:
+            hang.ended.set()
+
+
+class Waiting(LocalExecutor):
+    """A device that goes on when the other one hangs: otherwise it might have done all before that."""
+
+    hang: Hang
+
+    def execute(
+        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+    ) -> Generator[Result]:
+        for result in super().execute(job, items, token):
+            assert self.hang.began.wait(30)
+            yield result
+
+
+def hanging(engine: Engine, *hangs: Hang) -> SeveralExecutor:
+    """Gives an engine two devices of which the first one hangs, or both."""
+    shared = engine.executor
+    assert isinstance(shared, SeveralExecutor)
+    for executor, hang, kind in zip(
+        shared.executors, (*hangs, *hangs), (Hanging, Hanging if len(hangs) > 1 else Waiting), strict=False
+    ):
+        executor.__class__ = kind
+        executor.hang = hang  # type: ignore[attr-defined]
+    return shared
+
+
+@pytest.fixture(scope="module")
+def whole(device: Device) -> Film:
+    with Engine(device) as engine:
+        return engine.render(SCENE)
+
+
+@pytest.fixture
+def hang(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hang]:
+    """For a device that is given up soon."""
+    monkeypatch.setattr(sharing, "_SHORTEST_PATIENCE", 1.0)
+    found = Hang()
+    yield found
+    found.freed.set()
+
+
+def test_a_hung_device_is_left_out(device: Device, whole: Film, hang: Hang) -> None:
+    said: list[str] = []
+    with Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
+        shared = hanging(engine, hang)
+        film = engine.render(SCENE)
+        assert same(film, whole)
+        assert list(shared.failures) == [0]
+        line = f"{halves_of(device)}#1 {device.info.name} is left out, others do its work: "
+        line += f"{device.info.name}: the device has not answered for "
+        assert [each for each in said if each.startswith(line)]
+        assert [each for each in film.remarks if each.startswith(line)]
+        assert not hang.ended.is_set()
+        again = engine.render(SCENE)
+        assert same(again, whole)
+        assert [each["index"] for each in again.stats["devices"]] == [f"{halves_of(device)}#2"]
+
+
+def test_a_device_that_comes_back_late_does_no_harm(
+    device: Device, whole: Film, hang: Hang, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It comes back while the other one still has its tiles to do."""
+    execute = LocalExecutor.execute
+    late: list[bool] = []
+
+    def slow(own: LocalExecutor, *arguments: object) -> Generator[Result]:
+        for result in execute(own, *arguments):  # type: ignore[arg-type]
+            if own.device.info.index.endswith("#2") and hang.freed.is_set() and not late:
+                late.append(hang.ended.wait(20))
+            yield result
+
+    monkeypatch.setattr(LocalExecutor, "execute", slow)
+
+    def tell(line: str) -> None:
+        if "is left out" in line:
+            hang.freed.set()
+
+    with Engine(halves_of(device), budget_seconds=0.01, tell=tell) as engine:
+        shared = hanging(engine, hang)
+        film = engine.render(SCENE)
+        assert late == [True]
+        assert same(film, whole)
+        assert film.done.all()
+        assert sum(each["tiles"] for each in film.stats["devices"]) == film.grid.count
+        assert film.stats["rays"] == whole.stats["rays"]
+        assert list(shared.failures) == [0]
+        assert same(engine.render(SCENE), whole)
+
+
+def test_all_devices_hang(device: Device, hang: Hang) -> None:
+    other = Hang(after=15, freed=hang.freed)
+    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+        hanging(engine, hang, other)
+        with pytest.raises(DeviceError, match=r"no device is left: .* has not answered for") as caught:
+            engine.render(SCENE)
+        assert caught.value.status == 3
+
+
+def test_passes_of_a_hung_device_begin_again(device: Device, whole: Film, hang: Hang) -> None:
+    """It hangs when it has some samples of tiles, which nobody else has."""
+    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+        shared = hanging(engine, hang)
+        hang.after = 10_000
+        hang.began.set()
+        films = []
+        for film in engine.refine(SCENE):
+            films.append(film)
+            if film.stage.startswith("2 of"):
+                hang.after = 1
+        assert same(films[-1], whole)
+        assert list(shared.failures) == [0]
+
+
+def test_a_device_that_does_not_end_is_left_out(device: Device, whole: Film, hang: Hang) -> None:
+    """The caller stops; the hung device is waited for no longer than usual, and used no more."""
+    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+        shared = hanging(engine, hang)
+        hang.after = 0
+
+        def progress(_: object) -> None:
+            raise KeyError("stop")
+
+        with pytest.raises(KeyError):
+            engine.render(SCENE, progress)
+        assert hang.began.is_set()
+        assert list(shared.failures) == [0]
+        assert same(engine.render(SCENE), whole)
+
+
+def test_patience_follows_the_measured_speed(monkeypatch: pytest.MonkeyPatch) -> None:
+    """20 times what the launches should take, and at least 30 s."""
+    clock = Clock()
+    monkeypatch.setattr(sharing, "time", clock)
+    shared = Shared([offer(100)], [1.0, 1.0])
+    for device in (0, 1):
+        shared._workers[device].offer = shared._offers[0]
+        assert not shared.owes(device)  # it is not ready yet: nobody knows how long compiling takes
+        assert not len(shared.take(device, 0))
+        assert not shared.owes(device)
+    tiles = shared.take(0, 2)
+    assert shared.owes(0)
+    assert shared.patience(0) == 30.0
+    clock.now = 10.0
+    assert shared.done(0, tiles)  # a tile takes 5 s
+    assert not shared.owes(0)
+    shared.take(0, 3)
+    assert shared.patience(0) == pytest.approx(20 * 3 * 5.0)
+    # Of the other one nothing is known but that it should be as fast.
+    shared.take(1, 1)
+    assert shared.patience(1) == pytest.approx(20 * 5.0)
+
+
+def test_what_a_lost_device_tells_does_not_count() -> None:
+    shared = Shared([offer(10)], [1.0, 1.0])
+    for device in (0, 1):
+        shared._workers[device].offer = shared._offers[0]
+    tiles = shared.take(0, 4)
+    signs = shared.signs(0)
+    assert len(tiles)
+    shared.lose(0)
+    assert not shared.done(0, tiles)
+    assert not len(shared.take(0, 4))
+    assert list(shared.items(0)) == []
+    assert not shared.owes(0)
+    assert shared.signs(0) == signs + 1  # it has asked
+    left: deque[int] = deque()
+    for _ in shared.items(1):
+        while len(found := shared.take(1, 4)):
+            left.extend(found.tolist())
+            assert shared.done(1, found)
+    assert sorted(left) == list(range(10))
+
+
+# The program with a device that hangs for ever, as one whose driver does not return.
+PROGRAM = """
+import os, sys, time
+from clfractal.engine import sharing
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.cli import main
+
+execute = LocalExecutor.execute
+
+def hanging(own, *arguments):
+    for result in execute(own, *arguments):
+        if own.device.info.index.endswith("#1"):
+            open("hangs", "w").close()
+            time.sleep(10_000)
+        while not os.path.exists("hangs"):
+            time.sleep(0.01)
+        yield result
+
+LocalExecutor.execute = hanging
+sharing._SHORTEST_PATIENCE = float(sys.argv.pop(1))
+main()
+"""
+
+
+def started(folder: Path, patience: float, *options: str) -> subprocess.Popen[str]:
+    (folder / "scene.yaml").write_text(SCENE)
+    given = ["render", "scene.yaml", "-o", "out.exr", "--device", halves_of(choose()), *options]
+    return subprocess.Popen(
+        [sys.executable, "-P", "-c", PROGRAM, str(patience), *given],
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+
+
+def test_the_program_ends_although_a_thread_hangs(whole: Film, tmp_path: Path) -> None:
+    running = started(tmp_path, 1.0)
+    _, told = running.communicate(timeout=60)
+    assert running.returncode == 0, told
+    assert "is left out, others do its work: " in told
+    planes = read_exr(tmp_path / "out.exr")[0]
+    np.testing.assert_array_equal(planes["Z"], whole["Z"])
+    assert not (tmp_path / "out.exr.partial").exists()
+
+
+def test_ctrl_c_while_a_device_hangs(tmp_path: Path) -> None:
+    seconds = []
+    for _ in range(3):
+        running = started(tmp_path, 1000.0)
+        deadline = time.monotonic() + 60
+        while not (tmp_path / "hangs").exists():
+            assert running.poll() is None, running.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+        time.sleep(1.0)  # the other one has done all that it can
+        begin = time.monotonic()
+        running.send_signal(signal.SIGINT)
+        _, told = running.communicate(timeout=30)
+        seconds.append(time.monotonic() - begin)
+        assert running.returncode == 130, told
+        assert (tmp_path / "out.exr.partial").exists()
+        (tmp_path / "hangs").unlink()
+    assert min(seconds) < PROMISE_SECONDS
