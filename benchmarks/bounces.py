@@ -54,8 +54,8 @@ def ours(size: int, samples: int, seed: int, device: str | None) -> Drawn:
     """This engine's picture; the time is that of its kernels."""
     changes = {"image.width": size, "image.height": size, "renderer.samples": samples, "renderer.seed": seed}
     scene = load_scene(SCENE, overrides=[f"{key}={value}" for key, value in changes.items()])
-    film = render(scene, device=device)
-    return Drawn(film["G"].astype(np.float64), film.stats["kernel_ms"] / 1e3)
+    framebuffer = render(scene, device=device)
+    return Drawn(framebuffer["G"].astype(np.float64), framebuffer.stats["kernel_ms"] / 1e3)
 
 
 def theirs(size: int, samples: int) -> Drawn:

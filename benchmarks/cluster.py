@@ -30,7 +30,7 @@ import psutil
 import clfractal
 from clfractal.cluster.cluster import Cluster
 from clfractal.engine.engine import Engine
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
 from clfractal.images.tiles import TILE
 
@@ -147,10 +147,10 @@ def tasks(workers: int, rounds: int) -> None:
         with Engine() as engine:
             job = engine.prepare(LARGE)
         for _ in range(rounds):
-            films = JobFilms(job)
+            framebuffers = JobFramebuffers(job)
             own_before, before = psutil.Process().cpu_times(), running.cpu_times()
             start = time.perf_counter()
-            run(job, films.films, cluster)
+            run(job, framebuffers.framebuffers, cluster)
             wall = time.perf_counter() - start
             after, own_after = running.cpu_times(), psutil.Process().cpu_times()
             made = job.tiles
@@ -227,12 +227,12 @@ async def simulate(count: int, seconds: float, address: str) -> None:
     def tiles(_seat: Any, data: Any, arrays: Any, item: Any) -> real.Answer:
         with real._one_at_a_time:
             channels = len(real._unpacked(data, arrays).channels)
-        film = np.zeros((len(item.tiles), channels, TILE, TILE), np.float32)
+        framebuffer = np.zeros((len(item.tiles), channels, TILE, TILE), np.float32)
         own, counters, took = get_worker(), Counters(rays=1), seconds * len(item.tiles)
         return real.Answer(
             item.view,
             item.tiles,
-            film,
+            framebuffer,
             counters,
             took,
             own.address,

@@ -61,11 +61,11 @@ def measure(
 ) -> dict[str, tuple[list[float], bool]]:
     """Of each device or several: seconds of each round, and whether the picture has the bits of the first one's."""
     engines = {device: Engine(device) for device in devices}
-    films = {device: engine.render(scene, samples=samples) for device, engine in engines.items()}
-    first = films[devices[0]]
+    framebuffers = {device: engine.render(scene, samples=samples) for device, engine in engines.items()}
+    first = framebuffers[devices[0]]
     same = {
-        device: all(np.array_equal(film[name], first[name]) for name in first)
-        for device, film in films.items()
+        device: all(np.array_equal(framebuffer[name], first[name]) for name in first)
+        for device, framebuffer in framebuffers.items()
     }
     seconds: dict[str, list[float]] = {device: [] for device in devices}
     for number in range(rounds):

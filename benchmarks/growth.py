@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 from clfractal.cli import bench
 from clfractal.engine.engine import Engine
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
 from clfractal.integrators.volume import settings_of
 from clfractal.scene.load import load_scene
@@ -74,7 +74,7 @@ def fill_ms(scene: Scene, engine: Engine) -> float:
 def frame_ms(scene: Scene, engine: Engine) -> float:
     """Draws the scene into memory; milliseconds on the device. The engine keeps its grid."""
     job = engine.prepare(scene, precision="float32")
-    return run(job, JobFilms(job).films, engine.executor).kernel_ms
+    return run(job, JobFramebuffers(job).framebuffers, engine.executor).kernel_ms
 
 
 def figures(engine: Engine, repetitions: int, largest: int, most: int) -> Iterator[Figure]:

@@ -1,15 +1,16 @@
 """clfractal: an OpenCL render engine for 3D fractals.
 
     import clfractal
-    film = clfractal.render(clfractal.load_scene("scene.yaml"))
-    film["R"]            # float32, shape (height, width)
-    film.save("out.exr")
+    framebuffer = clfractal.render(clfractal.load_scene("scene.yaml"))
+    framebuffer["R"]            # float32, shape (height, width)
+    framebuffer.save("out.exr")
 
 Everything public is imported when it is first used, so that `import clfractal` costs nothing.
 """
 
 from __future__ import annotations
 
+import warnings
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -40,11 +41,13 @@ if TYPE_CHECKING:
     from clfractal.files.mesh import Mesh as Mesh
     from clfractal.files.resources import __version__ as __version__
     from clfractal.files.volume_file import Volume as Volume
-    from clfractal.images.film import Film as Film
+    from clfractal.images.framebuffer import Framebuffer as Framebuffer
     from clfractal.images.probe import Probe as Probe
     from clfractal.integrators.points import Distances as Distances
     from clfractal.scene.load import dump_scene as dump_scene
     from clfractal.scene.model import Scene as Scene
+
+    Film = Framebuffer  # the former name
 
 _HOMES = {
     "distances": "clfractal.api",
@@ -67,7 +70,7 @@ _HOMES = {
     "Stopped": "clfractal.errors",
     "Mesh": "clfractal.files.mesh",
     "Volume": "clfractal.files.volume_file",
-    "Film": "clfractal.images.film",
+    "Framebuffer": "clfractal.images.framebuffer",
     "Probe": "clfractal.images.probe",
     "Distances": "clfractal.integrators.points",
     "__version__": "clfractal.files.resources",
@@ -80,6 +83,9 @@ _HOMES = {
     "variations": "clfractal.engine.variations",
 }
 
+_FORMER = {"Film": "Framebuffer"}
+"""Names of before; each warns for one release."""
+
 __all__ = [*_HOMES]
 
 
@@ -90,6 +96,9 @@ if not TYPE_CHECKING:  # for a type checker every name would exist
             found = getattr(import_module(_HOMES[name]), name)
             globals()[name] = found  # the next time it is an attribute as any other
             return found
+        if name in _FORMER:
+            warnings.warn(f"clfractal.{name} is clfractal.{_FORMER[name]}", DeprecationWarning, stacklevel=2)
+            return __getattr__(_FORMER[name])
         raise AttributeError(f"module 'clfractal' has no attribute {name!r}")
 
 

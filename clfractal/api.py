@@ -1,4 +1,4 @@
-"""The Python API: scenes in, films of NumPy arrays out."""
+"""The Python API: scenes in, framebuffers of NumPy arrays out."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from clfractal.files.mesh import Mesh
     from clfractal.files.volume_file import Volume
     from clfractal.formulas.language import Chain
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
     from clfractal.images.probe import Probe
     from clfractal.integrators.points import Distances
     from clfractal.scene.coloring import Coloring
@@ -49,7 +49,7 @@ def render(
     channels: Sequence[str] | None = None,
     quality: str | None = None,
     executor: Elsewhere | None = None,
-) -> Film:
+) -> Framebuffer:
     """Renders a scene into memory; a stereo scene's two pictures are combined by its mode (see `render_pair`).
 
     Args:
@@ -68,8 +68,8 @@ def render(
         executor: a `clfractal.Cluster` that renders in the place of a device of this process.
 
     Returns:
-        A film: `film["R"]`, `film["Z"]`, ... are float32 arrays of shape (height, width) of the region;
-        colours are linear Rec. 709, positions and depth in scene units.
+        A framebuffer: `framebuffer["R"]`, `framebuffer["Z"]`, ... are float32 arrays of shape (height, width) of the
+        region; colours are linear Rec. 709, positions and depth in scene units.
 
     Raises:
         SceneError, FormulaError: the scene or a setting is wrong.
@@ -102,13 +102,13 @@ def render_pair(
     channels: Sequence[str] | None = None,
     quality: str | None = None,
     executor: Elsewhere | None = None,
-) -> tuple[Film, Film]:
+) -> tuple[Framebuffer, Framebuffer]:
     """Renders both eyes' pictures of a stereo scene into memory, for any `stereo.mode`.
 
     Arguments and errors as for `render`.
 
     Returns:
-        The films of the left and the right eye, of the size of `image` (half of it in the squeezed modes).
+        The framebuffers of the left and the right eye, of the size of `image` (half of it in the squeezed modes).
     """
     from clfractal.engine.engine import engine_on
 

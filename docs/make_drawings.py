@@ -283,7 +283,7 @@ def projectors() -> Drawing:
 # The rows of `stages`: each stage's kernel, with a question mark if only some scenes launch it, and what a march is after.
 _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("once for a block of pixels", ("send_cones?", "march_rays? cones")),
-    ("each sample", ("begin_shots",)),
+    ("each sample", ("begin_samples",)),
     (
         "each bounce: meet the surface",
         (
@@ -292,7 +292,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "march_rays surface",
             "march_inside?",
             "look_at_objects?",
-            "find_spots",
+            "find_interactions",
         ),
     ),
     (
@@ -306,7 +306,10 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "join_points?",
         ),
     ),
-    ("what is seen there", ("send_to_lights?", "send_air?", "color_spots?", "find_planes?", "add_glow?")),
+    (
+        "what is seen there",
+        ("send_to_lights?", "send_air?", "color_interactions?", "find_planes?", "add_glow?"),
+    ),
     (
         "direct light, mirrors",
         (
@@ -315,7 +318,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "gather_air?",
             "meet_lights?",
             "gather_light?",
-            "light_spots?",
+            "light_interactions?",
         ),
     ),
     (
@@ -346,7 +349,7 @@ _ASK_FORMULA = (
     "march_rays",
     "march_points",
     "march_inside",
-    "color_spots",
+    "color_interactions",
     "add_glow",
     "find_faces",
     "find_planes",
@@ -404,7 +407,7 @@ def stages() -> Drawing:
 
 
 def _queues(sheet: Drawing, corner: Point, width: float, height: float) -> None:
-    """What stages hand to each other: queues of rays and of what these met, and the state of each shot."""
+    """What stages hand to each other: queues of rays and of what these met, and the state of each sample."""
     x, y = corner
     sheet.text((x, y - 18), "what they hand on", PALE, anchor="lm", size=14)
     row = (
@@ -423,7 +426,7 @@ def _queues(sheet: Drawing, corner: Point, width: float, height: float) -> None:
             sheet.arrow((at - 22, y + height / 2), (at - 2, y + height / 2), PALE)
     last, under = x + 5 * (width + 22) + width / 2, y + height + 26
     sheet.box((x + width / 2, under), (last - x - width / 2, 30), RIGHT, 0.15)
-    told = "state of each shot, from stage to stage: sighting, spot, path, counters, and what else the scene needs"
+    told = "state of each sample, from stage to stage: sighting, interaction, path, counters, and what else the scene needs"
     sheet.text(((x + width / 2 + last) / 2, under + 15), told, size=14)
     for middle in (x + width / 2 + 12, last - 12):
         sheet.arrow((middle, y + height), (middle, under), PALE, both=True)

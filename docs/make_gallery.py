@@ -27,7 +27,7 @@ from clfractal.files.srgb import encode8
 from clfractal.formulas import catalog
 from clfractal.images.compose import APART
 from clfractal.images.develop import Development, developed
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 
 DOCS = Path(__file__).resolve().parent
@@ -106,24 +106,26 @@ def make_picture(path: Path) -> None:
     scene = load_scene(path)
     if scene.lighting.mode == "path":
         scene = load_scene(path, overrides=["output.denoise=true"])
-    film = render(beside(scene), channels=["R", "G", "B", "A"])
-    linear = shown_light(film)
-    coverage = film["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
+    framebuffer = render(beside(scene), channels=["R", "G", "B", "A"])
+    linear = shown_light(framebuffer)
+    coverage = (
+        framebuffer["A"][..., None] if scene.background == "transparent" else np.ones_like(linear[..., :1])
+    )
     shown = picture(reduced(linear, WIDTH), reduced(coverage, WIDTH))
     content, quality = small_enough(shown)
     target = PICTURES / f"{path.stem}.webp"
     target.write_bytes(content)
     (PICTURES / f"{path.stem}.png").unlink(missing_ok=True)
     size = len(content) // 1000
-    print(f"{target.name}: {size} kB, quality {quality}, {film.header['seconds']:.1f} s", flush=True)
+    print(f"{target.name}: {size} kB, quality {quality}, {framebuffer.header['seconds']:.1f} s", flush=True)
 
 
-def shown_light(film: Film) -> Floats:
-    """What a screen shows of a film, with its exposure and tone: linear light, shape (rows, columns, 3).
+def shown_light(framebuffer: Framebuffer) -> Floats:
+    """What a screen shows of a framebuffer, with its exposure and tone: linear light, shape (rows, columns, 3).
 
     What is brighter than the screen can show is cut here, before it is averaged, as in the full picture.
     """
-    bands = [band for _, band in developed(film, Development.of(film.header)).bands()]
+    bands = [band for _, band in developed(framebuffer, Development.of(framebuffer.header)).bands()]
     linear = np.stack([np.concatenate([band[name] for band in bands]) for name in "RGB"], axis=-1)
     return np.clip(linear, 0, 1)
 

@@ -63,8 +63,8 @@ def angles(a: Floats, b: Floats) -> Floats:
 def vectors(scene: Scene, what: str, **settings: Any) -> Floats:
     """Channels N or P of a rendered scene, shape (rows, columns, 3)."""
     names = [f"{what}.{axis}" for axis in "XYZ"]
-    film = render(scene, channels=names, **settings)
-    return np.stack([film[name] for name in names], axis=-1).astype(np.float64)
+    framebuffer = render(scene, channels=names, **settings)
+    return np.stack([framebuffer[name] for name in names], axis=-1).astype(np.float64)
 
 
 def ball_errors(normal: str) -> dict[tuple[int, int], float]:
@@ -182,9 +182,9 @@ def make_pictures() -> None:
     """The crops of figure 13 at full size, one sample for each pixel."""
     for normal in NORMALS:
         scene = figure(normal, SIZES[-1])
-        film = render(scene, channels=["R", "G", "B"], region=CROP)
+        framebuffer = render(scene, channels=["R", "G", "B"], region=CROP)
         target = DOCS / "pictures" / f"normals_{normal}.webp"
-        Image.fromarray(film.to_rgb8(scene.output.stops)).save(target, "WEBP", lossless=True, method=4)
+        Image.fromarray(framebuffer.to_rgb8(scene.output.stops)).save(target, "WEBP", lossless=True, method=4)
         print(target)
 
 

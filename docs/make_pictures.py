@@ -134,19 +134,19 @@ def make_picture(picture: Picture) -> None:
     seconds = 0.0
     for index, panel in enumerate(picture.panels):
         layer = [f"{panel.show}.{part}" for part in "RGB"] if panel.show in LAYERS else []
-        film = render(panel.scene, channels=["R", "G", "B", "A", "samples", *layer])
-        seconds += film.header["seconds"]
+        framebuffer = render(panel.scene, channels=["R", "G", "B", "A", "samples", *layer])
+        seconds += framebuffer.header["seconds"]
         if panel.show == "samples":
-            shown = Image.fromarray(_heat(film["samples"] / np.float32(panel.scene.renderer.samples)))
+            shown = Image.fromarray(_heat(framebuffer["samples"] / np.float32(panel.scene.renderer.samples)))
         elif layer:
-            shown = Image.fromarray(encode8(np.stack([film[name] for name in layer], axis=-1)))
+            shown = Image.fromarray(encode8(np.stack([framebuffer[name] for name in layer], axis=-1)))
         elif panel.show == "left" or panel.show == "right":
-            colors = np.stack([film[name] for name in "RGB"], axis=-1)
+            colors = np.stack([framebuffer[name] for name in "RGB"], axis=-1)
             assert panel.scene.stereo is not None
             behind = IDEAL[panel.scene.stereo.glasses][panel.show == "right"]  # the filter before this eye
             shown = Image.fromarray(encode8(colors * np.asarray(behind, np.float32)))
         else:
-            with Image.open(io.BytesIO(png_bytes(film))) as shown:
+            with Image.open(io.BytesIO(png_bytes(framebuffer))) as shown:
                 shown.load()
         shown = shown.convert("RGBA").resize((width, height), Image.Resampling.NEAREST)
         row, column = divmod(index, picture.columns)

@@ -20,7 +20,7 @@ from PIL import Image
 from clfractal.api import load_scene, render, render_pair
 from clfractal.files import resources
 from clfractal.images.compose import APART, Composed
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer
@@ -58,7 +58,7 @@ def small_scene(path: Path) -> Scene:
 
 
 @cache
-def small_films(path: Path) -> tuple[Film, ...]:
+def small_framebuffers(path: Path) -> tuple[Framebuffer, ...]:
     """The scene rendered small, for each eye; once for all tests, because building its program takes seconds."""
     scene = small_scene(path)
     channels = ["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "iterations"]
@@ -67,20 +67,22 @@ def small_films(path: Path) -> tuple[Film, ...]:
     return (render(scene, channels=channels),)
 
 
-def small_film(path: Path) -> Film:
+def small_framebuffer(path: Path) -> Framebuffer:
     """The scene rendered small; of a stereo scene what the left eye sees."""
-    return small_films(path)[0]
+    return small_framebuffers(path)[0]
 
 
 def small_picture(path: Path) -> Picture:
-    """What a screen would show of `small_films`: sRGB, shape (HEIGHT, WIDTH, 3); twice as wide for two eyes apart."""
-    scene, films = small_scene(path), small_films(path)
+    """What a screen would show of `small_framebuffers`: sRGB, shape (HEIGHT, WIDTH, 3); twice as wide for two eyes
+    apart.
+    """
+    scene, framebuffers = small_scene(path), small_framebuffers(path)
     if scene.stereo is None:
-        return films[0].to_rgb8(scene.output.stops)
+        return framebuffers[0].to_rgb8(scene.output.stops)
     apart = scene.stereo.mode in APART
     stereo = scene.stereo.model_copy(update={"mode": "split"}) if apart else scene.stereo
-    left, right = films
-    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_film().to_rgb8(scene.output.stops)
+    left, right = framebuffers
+    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_framebuffer().to_rgb8(scene.output.stops)
 
 
 def golden_path(path: Path) -> Path:

@@ -12,7 +12,7 @@ import pytest
 
 import clfractal
 from clfractal import camera
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from tests.shell import SCENE
 
 POINTS = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]]
@@ -89,20 +89,22 @@ def test_wrong_arguments_of_an_engine() -> None:
 def test_a_film_is_saved_as_asked_or_not_at_all(
     settings: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    film = Film(("R", "G", "B", "A"), (4, 4))
-    refused(lambda: film.save(tmp_path / "a.png", **settings), message)
+    framebuffer = Framebuffer(("R", "G", "B", "A"), (4, 4))
+    refused(lambda: framebuffer.save(tmp_path / "a.png", **settings), message)
     assert list(tmp_path.iterdir()) == []
-    refused(lambda: film.save(3), "path: must be a path, got 3")  # type: ignore[arg-type]
-    refused(lambda: film.to_rgb8(exposure=float("inf")), "exposure: must be a finite number, got inf")
+    refused(lambda: framebuffer.save(3), "path: must be a path, got 3")  # type: ignore[arg-type]
+    refused(lambda: framebuffer.to_rgb8(exposure=float("inf")), "exposure: must be a finite number, got inf")
 
 
 def test_numbers_of_numpy_are_numbers(tmp_path: Path) -> None:
-    film = clfractal.render(SCENE, samples=np.int64(2), region=np.array([4, 4, 8, 8]))  # type: ignore[arg-type]
-    assert clfractal.load_scene(film.header["scene"]).renderer.samples == 2
-    assert film["R"].shape == (8, 8)
-    film.save(tmp_path / "a.png", bits=np.int16(16), exposure=np.float32(0.5), transparent=np.bool_(False))
+    framebuffer = clfractal.render(SCENE, samples=np.int64(2), region=np.array([4, 4, 8, 8]))  # type: ignore[arg-type]
+    assert clfractal.load_scene(framebuffer.header["scene"]).renderer.samples == 2
+    assert framebuffer["R"].shape == (8, 8)
+    framebuffer.save(
+        tmp_path / "a.png", bits=np.int16(16), exposure=np.float32(0.5), transparent=np.bool_(False)
+    )
     assert (tmp_path / "a.png").read_bytes()[24] == 16
-    assert film.to_rgb8(exposure=np.float64(1)).shape == (8, 8, 3)
+    assert framebuffer.to_rgb8(exposure=np.float64(1)).shape == (8, 8, 3)
     counts, _ = clfractal.escape(
         {"name": "mandelbulb", "parameters": {"power": np.int32(2)}},
         np.array(POINTS, np.float32),

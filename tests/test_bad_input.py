@@ -355,7 +355,7 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
 
     def broken(*arguments: object) -> list[ProgramText]:
         def changed(text: str) -> str:
-            return text.replace("STAGE(find_spots)", "__kernel vod find_spots(STAGE_ARGUMENTS)")
+            return text.replace("STAGE(find_interactions)", "__kernel vod find_interactions(STAGE_ARGUMENTS)")
 
         return [
             replace(each, flat=replace(each.flat, text=changed(each.flat.text)))
@@ -367,10 +367,10 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
     monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
     monkeypatch.setattr(progress, "SILENT_SECONDS", 600.0)
     ended = shell("render", "scene.yaml", "-o", "old.png")
-    assert ended.is_one_line(3, "find_spots.cl:", "vod")
+    assert ended.is_one_line(3, "find_interactions.cl:", "vod")
     told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")
     assert told.status == 3
-    assert " | STAGE(find_spots)" in told.err.split("\n", 1)[1]
+    assert " | STAGE(find_interactions)" in told.err.split("\n", 1)[1]
     assert untouched(here)
 
 

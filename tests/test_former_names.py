@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+import clfractal
 from clfractal.device.select import Device, choose
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from tests.render.shots import engine_of
 
 
@@ -29,6 +30,12 @@ def test_an_engine_says_how_long_previews_were_built(device: Device) -> None:
 
 
 def test_a_film_has_makers() -> None:
-    film = Film(("R",), (8, 8))
-    with pytest.warns(DeprecationWarning, match="Film.makers is Film.provenance"):
-        assert film.makers is film.provenance
+    framebuffer = Framebuffer(("R",), (8, 8))
+    with pytest.warns(DeprecationWarning, match="Framebuffer.makers is Framebuffer.provenance"):
+        assert framebuffer.makers is framebuffer.provenance
+
+
+def test_a_framebuffer_was_a_film() -> None:
+    with pytest.warns(DeprecationWarning, match="clfractal.Film is clfractal.Framebuffer"):
+        former = clfractal.Film
+    assert former is clfractal.Framebuffer

@@ -103,7 +103,7 @@ def test_a_main_thread_that_does_not_answer(
     with suppress(KeyboardInterrupt), Unfinished(job, {}, tmp_path / "a.exr", shell, resume=False) as work:
         shell.state = work.interrupted
         for tile in range(tiles):
-            work.films[0].put(tile, np.zeros((len(job.channels), 32, 32), np.float32))
+            work.framebuffers[0].put(tile, np.zeros((len(job.channels), 32, 32), np.float32))
         shell.interrupted()
         assert [path.name for path in tmp_path.iterdir()] == left
         assert ("--resume" in capsys.readouterr().err) == bool(tiles)

@@ -104,7 +104,7 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
         *("clfractal.schema.error_texts", "clfractal.scene.palette", "clfractal.stereo.eyes"),
         *(
             "clfractal.engine.comfort",
-            "clfractal.engine.job_films",
+            "clfractal.engine.job_framebuffers",
             "clfractal.engine.probing",
             "clfractal.engine.refine",
         ),

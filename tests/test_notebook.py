@@ -61,5 +61,5 @@ def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
         assert np.asarray(picture.convert("L")).std() > 10  # there is something to see
     assert clfractal.load_scene(desk / "twisted.png").formula.iterations == 12
     assert (desk / "twisted.ply").stat().st_size > 100_000
-    with Image.open(desk / "twisted.webp") as film:
-        assert getattr(film, "n_frames", 1) == 8
+    with Image.open(desk / "twisted.webp") as framebuffer:
+        assert getattr(framebuffer, "n_frames", 1) == 8

@@ -18,7 +18,7 @@ from clfractal.files import resources
 from clfractal.files.exr import write_exr
 from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene, read_scene
 from tests.shell import SCENE, InProcess
 
@@ -233,5 +233,5 @@ def test_films(here: Path) -> None:
     assert contents(here) == before
     film.save("new.png")
     film.save("new.png")
-    assert isinstance(film, Film)
+    assert isinstance(film, Framebuffer)
     assert len(contents(here)) == len(before) + 1

@@ -11,7 +11,7 @@ import pytest
 
 import clfractal
 from clfractal.engine import finish
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import Progress, run
 from clfractal.images.compose import Side
 from tests.interrupts import planes, watched
@@ -104,17 +104,17 @@ def test_of_python(side: Side) -> None:
     """Stores that hold some of one eye's tiles: the time that is left is told from what this run did."""
     with clfractal.Engine() as engine:
         job = engine.prepare(clfractal.load_scene(SCENE))
-        whole = JobFilms(job)
-        run(job, whole.films, engine.executor)
-        films = JobFilms(job)
+        whole = JobFramebuffers(job)
+        run(job, whole.framebuffers, engine.executor)
+        framebuffers = JobFramebuffers(job)
         number = job.sides.index(side)
-        there = films.films[number]
+        there = framebuffers.framebuffers[number]
         there_already = 0
         for index in (0, 4, 5, 8):
             tile = there.grid.tile(index)
             there_already += tile.width * tile.height
             part = (slice(tile.y, tile.y + tile.height), slice(tile.x, tile.x + tile.width))
-            there.put(index, np.stack([whole.films[number][name][part] for name in there]))
+            there.put(index, np.stack([whole.framebuffers[number][name][part] for name in there]))
         seen: list[tuple[int, int, int]] = []
 
         def told(state: Progress) -> None:
@@ -122,10 +122,10 @@ def test_of_python(side: Side) -> None:
             assert (state.remaining is None) == (state.tiles_done == 4)
             assert state.remaining is None or state.remaining >= 0
 
-        state = run(job, films.films, engine.executor, progress=told)
+        state = run(job, framebuffers.framebuffers, engine.executor, progress=told)
         assert [each[1] for each in seen] == sorted(each[1] for each in seen)
         assert {(each[0], each[2]) for each in seen} == {(4, TILES)}
         assert (state.tiles_done, state.remaining) == (TILES, 0)
         assert state.rays == 2 * (2 * 96 * 70 - there_already)
-        for name in films.picture():
-            np.testing.assert_array_equal(films.picture()[name], whole.picture()[name])
+        for name in framebuffers.picture():
+            np.testing.assert_array_equal(framebuffers.picture()[name], whole.picture()[name])

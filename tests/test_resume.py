@@ -149,13 +149,13 @@ def test_work_goes_on_with_the_lanes_that_it_began_with(tmp_path: Path) -> None:
     begun = replace(job, views=(view,))
     shell = Shell(owns_process=False)
     with suppress(KeyboardInterrupt), Unfinished(begun, {}, whole, shell, resume=False) as work:
-        work.films[0].put(0, np.zeros((len(job.channels), 32, 32), np.float32))
+        work.framebuffers[0].put(0, np.zeros((len(job.channels), 32, 32), np.float32))
         raise KeyboardInterrupt
     later = replace(job, views=(replace(view, plan=replace(view.plan, lanes=other)),))
     assert continued(later, whole).views[0].plan.lanes == began
     assert continued(later, resumed).views[0].plan.lanes == other  # nothing was begun there
     with Unfinished(continued(later, whole), {}, whole, shell, resume=True) as work:
-        assert work.films[0].done.sum() == 1
+        assert work.framebuffers[0].done.sum() == 1
     elsewhere = replace(later, device=replace(later.device, driver="another"))
     assert continued(elsewhere, whole).views[0].plan.lanes == other
 

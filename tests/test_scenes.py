@@ -25,7 +25,7 @@ from tests.pictures import (
     keep_failure,
     read_picture,
     scene_paths,
-    small_film,
+    small_framebuffer,
     small_picture,
 )
 from tests.variants import every
@@ -146,7 +146,7 @@ def test_it_is_as_large_as_a_screen_or_a_print_and_smooth(path: Path) -> None:
 
 @each_picture
 def test_it_shows_something_well_lit(path: Path) -> None:
-    film = small_film(path)
+    film = small_framebuffer(path)
     for channel in film.channels:
         assert not np.isnan(film[channel]).any(), channel
     for channel in "RGB":
@@ -171,7 +171,7 @@ def test_it_shows_something_well_lit(path: Path) -> None:
 
 @each_picture
 def test_normals_have_length_one_and_face_the_eye(path: Path) -> None:
-    film = small_film(path)
+    film = small_framebuffer(path)
     hit = np.isfinite(film["Z"])
     normals = np.stack([film["N.X"], film["N.Y"], film["N.Z"]], axis=-1)[hit]
     np.testing.assert_allclose(np.linalg.norm(normals, axis=-1), 1.0, atol=2e-3)

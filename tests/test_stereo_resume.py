@@ -31,12 +31,12 @@ LEFT, RIGHT = "out.exr.partial", "out.exr.right.partial"
 SLOWLY = """
 import sys, time
 from clfractal.cli import main
-from clfractal.images.store import JournalFilm
-put = JournalFilm.put
+from clfractal.images.store import JournalFramebuffer
+put = JournalFramebuffer.put
 def slowly(*arguments):
     put(*arguments)
     time.sleep(0.03)
-JournalFilm.put = slowly
+JournalFramebuffer.put = slowly
 sys.argv = ["clfractal", "render", "scene.yaml", "-o", "out.exr", "--quiet"]
 main()
 """

@@ -81,7 +81,7 @@ def test_rays_and_distances_are_those_of_the_kernel(camera: str, engine: Engine)
     seen = see(ball_scene(camera), engine, "P.X", "P.Y", "P.Z")
     hit = np.isfinite(seen.t)
     assert 0.2 < hit.mean() < 0.8
-    places = np.stack([seen.film[axis].ravel() for axis in ("P.X", "P.Y", "P.Z")], axis=1)
+    places = np.stack([seen.framebuffer[axis].ravel() for axis in ("P.X", "P.Y", "P.Z")], axis=1)
     assert seen.rays[hit].at(seen.t[hit]) == pytest.approx(places[hit], abs=3e-6)
     # A pixel's width is what lies between the rays of neighbours, at the same distance.
     middle = np.array([30 * 60 + 30, 30 * 60 + 31])

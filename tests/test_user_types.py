@@ -19,12 +19,12 @@ import clfractal
 
 scene: clfractal.Scene = clfractal.load_scene({"version": 1, "formula": {"name": "hast"}, "camera": {}})
 fov: float = scene.model_copy(update={"image": {"width": 8}}).material.ambient
-film: clfractal.Film = clfractal.render(scene, samples=2, region=(0, 0, 8, 8))
-red: npt.NDArray[np.float32] = film["R"]
-rays = film.stats["rays"]
-pixels: npt.NDArray[np.uint8] = film.to_rgb8(exposure=1)
-size: tuple[int, int] = film.to_image().size
-colors = np.asarray(film)
+framebuffer: clfractal.Framebuffer = clfractal.render(scene, samples=2, region=(0, 0, 8, 8))
+red: npt.NDArray[np.float32] = framebuffer["R"]
+rays = framebuffer.stats["rays"]
+pixels: npt.NDArray[np.uint8] = framebuffer.to_rgb8(exposure=1)
+size: tuple[int, int] = framebuffer.to_image().size
+colors = np.asarray(framebuffer)
 counts, inside = clfractal.escape("hast", [[0, 0, 0]], iterations=3)
 most: np.int64 = counts.max()
 normal: npt.NDArray[np.float64] = clfractal.distances("hast", [[0.0, 0, 0]]).normal
@@ -53,7 +53,7 @@ names: list[str] = [device.name for device in clfractal.devices()]
 MISTAKES = """
 clfractal.render(scene, samples="4")
 clfractal.rendre(scene)
-number: int = film
+number: int = framebuffer
 """
 
 

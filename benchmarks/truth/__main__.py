@@ -51,7 +51,7 @@ def formulas(report: Report, engine: Engine, options: argparse.Namespace) -> Non
         seed = zlib.crc32(subject.name.encode())
         seen = see(subject.scene, engine, precision=options.precision)
         solid = Solid(subject.scene.chain, subject.scene.formula.iterations, engine.device)
-        taken = float(seen.film.stats["steps_per_ray"])
+        taken = float(seen.framebuffer.stats["steps_per_ray"])
         before = steps.record()["formulas"].get(subject.name)
         cells = [f"{subject.name:22} {subject.source:22}"]
         named = {"formula": subject.name, "scene": subject.source, "steps": taken}

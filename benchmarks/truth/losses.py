@@ -79,7 +79,7 @@ def measure_losses(seen: Seen, solid: Inside, count: int, random: np.random.Gene
 
 def _edges(seen: Seen) -> Mask:
     """Pixels whose neighbour to the right or below lies elsewhere: shape (height * width,)."""
-    t = np.where(np.isfinite(seen.t), seen.t, 1e300).reshape(seen.film.height, seen.film.width)
+    t = np.where(np.isfinite(seen.t), seen.t, 1e300).reshape(seen.framebuffer.height, seen.framebuffer.width)
     wide = np.where(
         t < 1e300, seen.rays.width(np.where(np.isfinite(seen.t), seen.t, 0.0)).reshape(t.shape), 0.0
     )

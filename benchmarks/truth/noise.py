@@ -27,7 +27,7 @@ from benchmarks.truth.rays import Floats
 from clfractal.camera.views import scene_view
 from clfractal.engine.engine import Engine
 from clfractal.files.srgb import encode
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 
@@ -149,22 +149,24 @@ def _errors(scene: Scene, engine: Engine, side: int) -> tuple[Floats, Floats, Fl
     """A picture minus its mean over a pixel, the same smoothed, both (height, width, 3), and which share shows the set."""
     places = (np.arange(side) + 0.5) / side - 0.5
     around = [engine.render(moved(scene, x, y), samples=1) for y in places for x in places]
-    mean = np.mean([_light(film) for film in around], axis=0)
-    mean_smooth = np.mean([_smooth_light(film) for film in around], axis=0)
-    coverage: Floats = np.mean([film["A"] > 0 for film in around], axis=0)
+    mean = np.mean([_light(framebuffer) for framebuffer in around], axis=0)
+    mean_smooth = np.mean([_smooth_light(framebuffer) for framebuffer in around], axis=0)
+    coverage: Floats = np.mean([framebuffer["A"] > 0 for framebuffer in around], axis=0)
     found = engine.render(scene, samples=1)
     plain, smooth = _codes(_light(found)), _codes(_smooth_light(found))
     return plain - _codes(mean), smooth - _codes(mean_smooth), coverage
 
 
-def _light(film: Film) -> Floats:
-    """A film's light as a screen can show it, shape (height, width, 3)."""
-    return np.clip(np.asarray(film, np.float64), 0.0, 1.0)
+def _light(framebuffer: Framebuffer) -> Floats:
+    """A framebuffer's light as a screen can show it, shape (height, width, 3)."""
+    return np.clip(np.asarray(framebuffer, np.float64), 0.0, 1.0)
 
 
-def _smooth_light(film: Film) -> Floats:
-    """The same of the smoothed film."""
-    found: Floats = np.clip(smoothed(np.asarray(film, np.float64), film["A"].astype(np.float64)), 0.0, 1.0)
+def _smooth_light(framebuffer: Framebuffer) -> Floats:
+    """The same of the smoothed framebuffer."""
+    found: Floats = np.clip(
+        smoothed(np.asarray(framebuffer, np.float64), framebuffer["A"].astype(np.float64)), 0.0, 1.0
+    )
     return found
 
 

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from benchmarks.truth.rays import Floats, Rays, all_pixels, pixel_rays, ray_distances
 from clfractal.engine.engine import Engine
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 
 
@@ -18,13 +18,13 @@ class Seen:
     """All pixels of a picture, row by row.
 
     Attributes:
-        film: with the channel Z, and others that were asked for.
+        framebuffer: with the channel Z, and others that were asked for.
         rays: through the pixels' middles.
         x, y: columns and rows.
         t: distances along the rays to what was hit, scene units; inf where nothing was.
     """
 
-    film: Film
+    framebuffer: Framebuffer
     rays: Rays
     x: npt.NDArray[np.intp]
     y: npt.NDArray[np.intp]
@@ -37,7 +37,7 @@ def see(scene: Scene, engine: Engine, *channels: str, precision: str | None = No
     Raises:
         DeviceError, KernelBuildError: the device failed.
     """
-    film = engine.render(scene, samples=1, channels=("Z", *channels), precision=precision)
-    x, y = all_pixels(film)
+    framebuffer = engine.render(scene, samples=1, channels=("Z", *channels), precision=precision)
+    x, y = all_pixels(framebuffer)
     rays = pixel_rays(scene, x, y)
-    return Seen(film, rays, x, y, ray_distances(scene, rays, film["Z"].ravel()))
+    return Seen(framebuffer, rays, x, y, ray_distances(scene, rays, framebuffer["Z"].ravel()))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.camera.views import scene_view
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float64]
@@ -104,7 +104,7 @@ def ray_distances(scene: Scene, rays: Rays, depth: npt.ArrayLike) -> Floats:
     return result
 
 
-def all_pixels(film: Film) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def all_pixels(framebuffer: Framebuffer) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
     """Columns and rows of all pixels, each of shape (height * width,), row by row."""
-    rows, columns = np.indices((film.height, film.width))
+    rows, columns = np.indices((framebuffer.height, framebuffer.width))
     return columns.ravel(), rows.ravel()

@@ -64,9 +64,9 @@ def measure_sphere(camera: str, side: int, engine: Engine, overrides: Sequence[s
     hit = np.isfinite(t)
     depth = np.full(len(t), np.inf)
     depth[hit] = np.abs(t[hit] - exact[hit]) / rays.width(exact)[hit]
-    normals = np.stack([seen.film[axis].ravel()[meets] for axis in ("N.X", "N.Y", "N.Z")], axis=1).astype(
-        float
-    )
+    normals = np.stack(
+        [seen.framebuffer[axis].ravel()[meets] for axis in ("N.X", "N.Y", "N.Z")], axis=1
+    ).astype(float)
     cross = np.linalg.norm(np.cross(normals, rays.at(exact)), axis=1)
     angle = np.degrees(np.arctan2(cross, np.sum(normals * rays.at(exact), axis=1)))
     return Sphere(

@@ -20,7 +20,7 @@ from clfractal.device.peak import fma_peak
 from clfractal.device.select import Device, choose
 from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import Progress
 from clfractal.engine.run import run as do
@@ -212,9 +212,9 @@ def _render_row(name: str, scene: Scene, device: Device, peak: float, repetition
 
 
 def _once(job: Job, engine: Engine) -> tuple[float, Progress]:
-    films = JobFilms(job)
+    framebuffers = JobFramebuffers(job)
     start = time.perf_counter()
-    state = do(job, films.films, engine.executor)
+    state = do(job, framebuffers.framebuffers, engine.executor)
     return time.perf_counter() - start, state
 
 

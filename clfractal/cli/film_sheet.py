@@ -62,8 +62,8 @@ def _preview(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
         scenes = FilmScenes(engine, scene)
         for number in numbers:
             shown = scenes.scene(number).model_copy(update={"animation": None})
-            film = engine.render(small_scene(shown, *size), channels=_CHANNELS)
-            pictures.append(film.to_rgb8())
+            framebuffer = engine.render(small_scene(shown, *size), channels=_CHANNELS)
+            pictures.append(framebuffer.to_rgb8())
     names = [f"{number}   {number / animation.fps:.2f} s" for number in numbers]
     sheet_of(pictures, names).save(sheet)
     seconds = time.perf_counter() - begun

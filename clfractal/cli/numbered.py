@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from clfractal.cli.progress import Reporter
 from clfractal.cli.unfinished import Unfinished, continued
 from clfractal.engine.finish import save_job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
 
 if TYPE_CHECKING:
@@ -55,17 +55,17 @@ def render_one(
     header = job.header()
     reporter = Reporter(shell, job.tiles)
     if not keep and 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
-        films = JobFilms(job)
-        state = _run(job, films.films, engine, reporter)
+        framebuffers = JobFramebuffers(job)
+        state = _run(job, framebuffers.framebuffers, engine, reporter)
         rendered = time.perf_counter()
-        _save(job, films.films, paths, header, bits or {})
+        _save(job, framebuffers.framebuffers, paths, header, bits or {})
         return _made(state, begun, rendered)
     if resume:
         job = continued(job, paths[0])
     with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
-        state = _run(job, unfinished.films, engine, reporter)
+        state = _run(job, unfinished.framebuffers, engine, reporter)
         rendered = time.perf_counter()
-        _save(job, unfinished.films, paths, header, bits or {})
+        _save(job, unfinished.framebuffers, paths, header, bits or {})
         return _made(state, begun, rendered)
 
 

@@ -98,18 +98,18 @@ def _render(
         if _beside(order) != order.streamed:  # of a temporary file nothing stays
             shell.state = unfinished.interrupted
         try:
-            state = run(job, unfinished.films, engine.executor, progress=reporter)
+            state = run(job, unfinished.framebuffers, engine.executor, progress=reporter)
         finally:
             reporter.close()
         rendered = time.perf_counter()
-        save_job(job, unfinished.films, outputs, header)
+        save_job(job, unfinished.framebuffers, outputs, header)
         written = time.perf_counter()
         comfort = None
         if job.scene.stereo is not None:  # asked here, so that other scenes do not load what measures it
             from clfractal.engine.comfort import comfort_of_job
 
-            comfort = comfort_of_job(job, unfinished.films, engine.preview)
-        remarks = remarks_of(job, state, unfinished.films, comfort)
+            comfort = comfort_of_job(job, unfinished.framebuffers, engine.preview)
+        remarks = remarks_of(job, state, unfinished.framebuffers, comfort)
     shell.state = lambda: "clfractal: interrupted"
     values = stats.statistics(
         job,

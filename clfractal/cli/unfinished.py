@@ -15,7 +15,7 @@ from clfractal.engine.job import Job
 from clfractal.files.frame_names import PARTIAL
 from clfractal.files.journal import identity_of
 from clfractal.images.compose import Side
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.scene.model import Scene
 
 
@@ -30,7 +30,7 @@ class Unfinished:
         shell: prints a message if earlier work is discarded; takes the files away at an interrupt, too.
 
     Raises:
-        FileError: see `JournalFilm`.
+        FileError: see `JournalFramebuffer`.
     """
 
     def __init__(
@@ -40,12 +40,12 @@ class Unfinished:
         self.paths = partial_paths(job, output)
         self.output = output
         self.first = output.with_name(output.name + PARTIAL)
-        self.films: list[JournalFilm] = []
+        self.framebuffers: list[JournalFramebuffer] = []
         try:
             for number, (view, path) in enumerate(zip(job.views, self.paths, strict=True)):
                 discards = path.exists() and not resume
-                self.films.append(
-                    JournalFilm(
+                self.framebuffers.append(
+                    JournalFramebuffer(
                         path,
                         job.identity(number),
                         view.plan.channels,
@@ -72,26 +72,26 @@ class Unfinished:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if kind is None:
-            for film in self.films:
-                film.discard()
+            for framebuffer in self.framebuffers:
+                framebuffer.discard()
         else:
             self._leave()
         self.shell.leaving.remove(self._leave)
 
     def interrupted(self) -> str:
         """What to say of an interrupt."""
-        done = sum(int(film.done.sum()) for film in self.films)
-        tiles = sum(film.grid.count for film in self.films)
+        done = sum(int(framebuffer.done.sum()) for framebuffer in self.framebuffers)
+        tiles = sum(framebuffer.grid.count for framebuffer in self.framebuffers)
         if not done:  # journals without a tile do not stay
             return f"{self.output}: interrupted before a tile was done"
         return f"{self.first}: interrupted with {done} of {tiles} tiles done; --resume continues"
 
     def _leave(self) -> None:
-        for film in self.films:
-            if film.done.any():
-                film.close()
+        for framebuffer in self.framebuffers:
+            if framebuffer.done.any():
+                framebuffer.close()
             else:
-                film.discard()
+                framebuffer.discard()
 
     def _drop_others(self, output: Path, shell: Shell) -> None:
         """Removes the journals of views that an earlier render to the same output had, but this one does not."""

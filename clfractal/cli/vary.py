@@ -124,15 +124,15 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
             f"clfractal: interrupted with {len(pictures)} of {choice.count} variations written"
         )
         for name, variation in zip(names, _worthwhile(scene, drawn, choice.count, engine), strict=False):
-            film = engine.render(small_scene(variation.scene, *size), channels=_CHANNELS)
+            framebuffer = engine.render(small_scene(variation.scene, *size), channels=_CHANNELS)
             text = write_document(to_folder.plain(variation.scene))
             if not choice.is_sheet:
                 # The picture holds the variation itself, rather than what made the picture small and quick.
-                film.tell("scene", text)
-                film.save(choice.folder / f"{name}.png")
+                framebuffer.tell("scene", text)
+                framebuffer.save(choice.folder / f"{name}.png")
             path = choice.folder / f"{name}.yaml"
             _write(path, (_heading(order, choice, len(pictures) + 1, variation) + text).encode())
-            pictures.append(film.to_rgb8())
+            pictures.append(framebuffer.to_rgb8())
             shell.say(f"{path}: {variation.remark}")
     if not pictures:
         raise SceneError("no variation shows anything", Where(order.scene))

@@ -24,7 +24,7 @@ from clfractal.scene.stereo import APART
 if TYPE_CHECKING:
     from clfractal.device.cancel import CancelToken
     from clfractal.engine.engine import Engine
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
 
 # Seconds between two looks at the disk, and between two pictures of one scene that are not its last.
 _INTERVAL, _LEAST_APART = 0.25, 0.5
@@ -115,11 +115,13 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
     try:
         with _ended_by_change(watched) as token, speaking_of(order.scene), naming_options():
             written = 0.0
-            for film in engine.refine(scene, precision=order.precision, samples=order.samples, token=token):
-                last = not film.stage
+            for framebuffer in engine.refine(
+                scene, precision=order.precision, samples=order.samples, token=token
+            ):
+                last = not framebuffer.stage
                 if last or time.perf_counter() - written >= _LEAST_APART:
                     for path in outputs:
-                        _save(film, scene, path)
+                        _save(framebuffer, scene, path)
                     written = time.perf_counter()
     except Stopped:
         return False
@@ -128,14 +130,14 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
         return True
     names = ", ".join(map(str, outputs))
     shell.say(f"{names}: {scene.image.width} x {scene.image.height}, {time.perf_counter() - begun:.2f} s")
-    for remark in film.remarks:
+    for remark in framebuffer.remarks:
         shell.say(f"{order.scene}: {remark}")
     return True
 
 
-def _save(film: Film, scene: Scene, path: Path) -> None:
+def _save(framebuffer: Framebuffer, scene: Scene, path: Path) -> None:
     output = scene.output
-    film.save(path, half=output.half_channels, bits=output.png_bits, quality=output.quality)
+    framebuffer.save(path, half=output.half_channels, bits=output.png_bits, quality=output.quality)
 
 
 @contextmanager

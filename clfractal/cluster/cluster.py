@@ -66,7 +66,7 @@ class Cluster:
     """Workers of a Dask cluster, for the argument `executor` of `clfractal.render` and others.
 
         with clfractal.Cluster("tcp://scheduler:8786") as cluster:
-            film = clfractal.render(scene, executor=cluster)
+            framebuffer = clfractal.render(scene, executor=cluster)
 
     Only one thread may use it at a time. A script that starts workers with `local:N` needs the usual
     `if __name__ == "__main__":`, since these are new processes.
@@ -176,9 +176,9 @@ class Cluster:
                     chosen = wanted[answer.view][answer.tiles] if answer.view in wanted else np.zeros(0, bool)
                     if answer.view not in wanted or not chosen.any():
                         continue
-                    tiles, film = answer.tiles, answer.film
+                    tiles, framebuffer = answer.tiles, answer.framebuffer
                     if not chosen.all():
-                        tiles, film = tiles[chosen], film[chosen]
+                        tiles, framebuffer = tiles[chosen], framebuffer[chosen]
                     wanted[answer.view][tiles] = False
                     left -= len(tiles)
                     self._count(answer)
@@ -186,7 +186,7 @@ class Cluster:
                     counters = replace(
                         answer.counters, build_ms=answer.counters.build_ms / max(len(self._shares), 1)
                     )
-                    yield Result(answer.view, tiles, film, counters, answer.render_device)
+                    yield Result(answer.view, tiles, framebuffer, counters, answer.render_device)
                 finally:
                     self._call(self._dispatcher.stored)
         finally:

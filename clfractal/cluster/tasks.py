@@ -93,7 +93,7 @@ class Answer:
     Attributes:
         view: number of the view.
         tiles: their indices.
-        film: float32 of shape (tiles, channels, TILE, TILE).
+        framebuffer: float32 of shape (tiles, channels, TILE, TILE).
         counters: what they took.
         seconds: wall time of the worker, with what it had to build.
         worker: its address.
@@ -103,7 +103,7 @@ class Answer:
 
     view: int
     tiles: Tiles
-    film: Floats
+    framebuffer: Floats
     counters: Counters
     seconds: float
     worker: str
@@ -157,16 +157,16 @@ def tiles(seat: Seat, data: bytes, arrays: Arrays, item: WorkItem) -> Answer | F
     def work(engine: Engine, token: CancelToken) -> Answer:
         start = time.perf_counter()
         job = _fitted(_unpacked(data, arrays), engine.device)
-        counters, found, films = Counters(), [], []
+        counters, found, framebuffers = Counters(), [], []
         for result in engine.executor.execute(job, [item], token):
             counters.add(result.counters)
             if len(result.tiles):
                 found.append(np.asarray(result.tiles, np.int32))
-                films.append(result.film)
+                framebuffers.append(result.framebuffer)
         return Answer(
             item.view,
             np.concatenate(found),
-            films[0] if len(films) == 1 else np.concatenate(films),
+            framebuffers[0] if len(framebuffers) == 1 else np.concatenate(framebuffers),
             counters,
             time.perf_counter() - start,
             get_worker().address,

@@ -23,7 +23,7 @@ from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
     from clfractal.engine.preview import Preview
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
 
 SceneLike: TypeAlias = Scene | str | Path | Mapping[str, Any]
 
@@ -150,7 +150,7 @@ class AnyEngine(ABC):
         channels: Sequence[str] | None = None,
         quality: str | None = None,
         token: CancelToken | None = None,
-    ) -> Film:
+    ) -> Framebuffer:
         """Renders a scene into memory; arguments, result and errors as for `clfractal.render`.
 
         Args:
@@ -169,11 +169,11 @@ class AnyEngine(ABC):
                 channels=channels,
                 quality=quality,
             )
-            return self._film(job, start, progress, token)
+            return self._framebuffer(job, start, progress, token)
 
     def render_in_order(
         self, scenes: Iterable[Scene], progress: ProgressCallback | None = None, **settings: Any
-    ) -> Generator[Film]:
+    ) -> Generator[Framebuffer]:
         """The pictures of scenes, one after the other; an engine may render some before they are asked for.
 
         Arguments and errors as for `render`.
@@ -183,15 +183,15 @@ class AnyEngine(ABC):
             start = time.perf_counter()
             for job, _ in jobs:
                 with self._alone():
-                    film = self._film(job, start, progress, None)
-                yield film
+                    framebuffer = self._framebuffer(job, start, progress, None)
+                yield framebuffer
                 start = time.perf_counter()
 
-    def _film(
+    def _framebuffer(
         self, job: Job, start: float, progress: ProgressCallback | None, token: CancelToken | None
-    ) -> Film:
+    ) -> Framebuffer:
         """The picture of a job, in memory; `start` is when the call began, by `time.perf_counter`."""
-        from clfractal.engine.job_films import JobFilms, Took
+        from clfractal.engine.job_framebuffers import JobFramebuffers, Took
 
         if job.stays_apart:
             assert job.scene.stereo is not None
@@ -199,9 +199,9 @@ class AnyEngine(ABC):
                 f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
                 Where(path="stereo.mode"),
             )
-        films = JobFilms(job)
-        state = run(job, films.films, self.executor, progress=progress, token=token)
-        return films.picture(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
+        framebuffers = JobFramebuffers(job)
+        state = run(job, framebuffers.framebuffers, self.executor, progress=progress, token=token)
+        return framebuffers.picture(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
 
     def render_pair(
         self,
@@ -214,9 +214,9 @@ class AnyEngine(ABC):
         channels: Sequence[str] | None = None,
         quality: str | None = None,
         token: CancelToken | None = None,
-    ) -> tuple[Film, Film]:
+    ) -> tuple[Framebuffer, Framebuffer]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
-        from clfractal.engine.job_films import JobFilms, Took
+        from clfractal.engine.job_framebuffers import JobFramebuffers, Took
 
         start = time.perf_counter()
         arguments.function("progress", progress)
@@ -232,9 +232,9 @@ class AnyEngine(ABC):
             job = self.prepare(
                 loaded, precision=precision, samples=samples, size=size, channels=channels, quality=quality
             )
-            films = JobFilms(job)
-            state = run(job, films.films, self.executor, progress=progress, token=token)
-            eyes = films.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
+            framebuffers = JobFramebuffers(job)
+            state = run(job, framebuffers.framebuffers, self.executor, progress=progress, token=token)
+            eyes = framebuffers.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
             return eyes["left"], eyes["right"]
 
     @contextmanager

@@ -74,20 +74,20 @@ class CanvasKernels:
         self._place, self._enlarge = self._built.kernel("place_tiles"), self._built.kernel("enlarge")
 
     def place(
-        self, canvas: Canvas, number: int, clip: Region, film: cl.Buffer, places: cl.Buffer, tiles: int
+        self, canvas: Canvas, number: int, clip: Region, framebuffer: cl.Buffer, places: cl.Buffer, tiles: int
     ) -> None:
         """Copies finished tiles of a view into a canvas, behind the launch that makes them; nobody waits.
 
         Args:
             clip: the part of the view that was rendered; it may be less than what the canvas holds.
-            film, places: as the launch has them (see `OutputSet`).
+            framebuffer, places: as the launch has them (see `OutputSet`).
             tiles: how many there are.
         """
         part = canvas.parts[number]
         region = part.region
         numbers = (part.offset, region.x, region.y, region.width, clip.x, clip.y, clip.right, clip.bottom)
         self._place.set_args(
-            film, places, canvas.colors, canvas.depths, *(np.int32(each) for each in numbers)
+            framebuffer, places, canvas.colors, canvas.depths, *(np.int32(each) for each in numbers)
         )
         group = fitting(self.device, self._place, ROW_GROUP)
         cl.enqueue_nd_range_kernel(self.device.queue, self._place, (TILE, tiles), group)
@@ -207,9 +207,9 @@ class CanvasStore:
         return self._done
 
     def put_tiles(
-        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+        self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
     ) -> None:
-        """Counts finished tiles; `film` holds none of them."""
+        """Counts finished tiles; `framebuffer` holds none of them."""
         self._done[indices] = True
 
     def tell(self, key: str, value: Any) -> None:

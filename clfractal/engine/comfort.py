@@ -149,10 +149,10 @@ def comfort_of_job(job: Job, stores: Sequence[Picture], preview: Preview) -> Com
     """
     if job.scene.stereo is None:
         return None
-    return comfort_of_films(job, stores) if _has_depth(job) else measured(job.scene, preview)
+    return comfort_of_framebuffers(job, stores) if _has_depth(job) else measured(job.scene, preview)
 
 
-def comfort_of_films(job: Job, stores: Sequence[Picture]) -> Comfort | None:
+def comfort_of_framebuffers(job: Job, stores: Sequence[Picture]) -> Comfort | None:
     """The same without a preview: None also for pictures that lack the depth channel."""
     if job.scene.stereo is None or not _has_depth(job):
         return None

@@ -24,7 +24,7 @@ from clfractal.integrators.kept import Resources
 from clfractal.integrators.kernel import KernelArgument, ProgramText, TileKernel
 from clfractal.integrators.passes import STATISTICS, kept_numbers
 from clfractal.integrators.plan import PlannedView
-from clfractal.shading.mattes import told
+from clfractal.shading.cryptomatte import told
 
 TILE_PIXELS = TILE * TILE
 # Work-items of a group: enough for a GPU's wave, and one part of a tile for a CPU thread.
@@ -34,18 +34,20 @@ SLOTS = 3
 _ALIGNMENT = 4096
 
 Outlet = Callable[[cl.Buffer, cl.Buffer, int], None]
-"""Takes finished tiles on the device by a kernel in its queue: of the film, at these places, so many."""
+"""Takes finished tiles on the device by a kernel in its queue: of the framebuffer, at these places, so many."""
 Floats = npt.NDArray[np.float32]
 Counts = npt.NDArray[np.uint64]
 
 
 @dataclass(frozen=True, slots=True)
 class OutputSet:
-    """Where one launch leaves its results: `results` as a whole, of which `statistics` are the head and `film` the rest."""
+    """Where one launch leaves its results: `results` as a whole, of which `statistics` are the head and `framebuffer`
+    the rest.
+    """
 
     results: cl.Buffer
     statistics: cl.Buffer
-    film: cl.Buffer
+    framebuffer: cl.Buffer
     places: cl.Buffer
 
 
@@ -72,21 +74,23 @@ class OutputBuffers:
                     cl.enqueue_copy(self.device.queue, buffer, np.zeros(size, np.uint8))
             self._wave_sizes = wanted
 
-    def fit(self, film: int, statistics: int, places: int) -> None:
+    def fit(self, framebuffer: int, statistics: int, places: int) -> None:
         """Makes sure that each set has room for so many bytes."""
-        if all(have >= want for have, want in zip(self.sizes, (film, statistics, places), strict=True)):
+        if all(
+            have >= want for have, want in zip(self.sizes, (framebuffer, statistics, places), strict=True)
+        ):
             return
         # Parts of a buffer begin at multiples of what any device asks for.
         wide = -(-max(self.sizes[1], statistics) // _ALIGNMENT) * _ALIGNMENT
-        self.sizes = (max(self.sizes[0], film), wide, max(self.sizes[2], places))
+        self.sizes = (max(self.sizes[0], framebuffer), wide, max(self.sizes[2], places))
         self.sets = []
         for _ in range(SLOTS):
-            results = self.device.buffer(wide + self.sizes[0], "the film")
-            with self.device.failures("allocating the film"):
+            results = self.device.buffer(wide + self.sizes[0], "the framebuffer")
+            with self.device.failures("allocating the framebuffer"):
                 statistics_part = results.get_sub_region(0, wide)
-                film_part = results.get_sub_region(wide, self.sizes[0])
+                framebuffer_part = results.get_sub_region(wide, self.sizes[0])
             places_buffer = self.device.buffer(self.sizes[2], "tiles' places")
-            self.sets.append(OutputSet(results, statistics_part, film_part, places_buffer))
+            self.sets.append(OutputSet(results, statistics_part, framebuffer_part, places_buffer))
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,13 +141,13 @@ class Drawing:
         kernel = _kernel_of(view.scene.renderer.type)(view, resources)
         arguments = kernel.arguments()
         self._divide(kernel, tiles)
-        film = self.capacity * len(plan.channels) * TILE_PIXELS * 4
+        framebuffer = self.capacity * len(plan.channels) * TILE_PIXELS * 4
         statistics = self.capacity * self.packets * 4 * len(STATISTICS)
         sizes = [_size(argument) for argument in arguments]
         self.device.check_memory(
-            SLOTS * (film + statistics) + sum(sizes) + sum(self.wave.sizes),
+            SLOTS * (framebuffer + statistics) + sum(sizes) + sum(self.wave.sizes),
             "rendering",
-            largest=max(film, *sizes, *self.wave.sizes),
+            largest=max(framebuffer, *sizes, *self.wave.sizes),
         )
         built = self._built(kernel, sizes, resources)
         self.build_ms = self.device.loaded.building.milliseconds - built_before
@@ -151,7 +155,7 @@ class Drawing:
         if other or self.view is None or view.scene.formula.iterations > self.view.scene.formula.iterations:
             self._begin_pace()
         self._programs, self.view = built, view
-        self.outputs.fit(film, statistics, self.capacity * 16)
+        self.outputs.fit(framebuffer, statistics, self.capacity * 16)
         self.outputs.fit_wave(self.wave.sizes)
         self._upload(arguments)
         self._kept_count = len(kept_numbers(plan, view.scene.renderer))
@@ -220,7 +224,7 @@ class Drawing:
                 self.device.queue, own.places, places, is_blocking=False
             )
             kept = self._kept if self._kept is not None else own.places  # a stand-in: nobody reads it
-            buffers = [own.film, kept, own.statistics, own.places, *self._buffers[:-1]]
+            buffers = [own.framebuffer, kept, own.statistics, own.places, *self._buffers[:-1]]
             buffers += [*self.outputs.wave[: len(self.wave.sizes)], self._buffers[-1]]
             events = self._stages.enqueue(span, [*buffers, len(self.view.plan.channels), self._kept_count])
             self.device.queue.flush()
@@ -230,7 +234,7 @@ class Drawing:
         """Lets an outlet take the tiles of a launch that has ended, before the launch's buffers are used again."""
         own = self.outputs.sets[span.slot]
         with self.device.failures("showing tiles"):
-            outlet(own.film, own.places, len(span.tiles))
+            outlet(own.framebuffer, own.places, len(span.tiles))
 
     def collect(self, span: Span) -> tuple[Floats, Counts]:
         """Channels of finished tiles, shape (tiles, channels, TILE, TILE), and the sums of STATISTICS."""
@@ -238,13 +242,15 @@ class Drawing:
         shape = (len(span.tiles), len(self.view.plan.channels), TILE, TILE)
         head, counts = self.outputs.sizes[1], len(span.tiles) * self.packets * len(STATISTICS)
         found = np.empty(head + 4 * int(np.prod(shape)), np.uint8)
-        with self.device.failures("reading the film"):
+        with self.device.failures("reading the framebuffer"):
             cl.enqueue_copy(self.device.transfers, found, self.outputs.sets[span.slot].results)
         # By tiles first: numbers in few long rows are summed eight times as fast as in many short ones.
         rows = found[: 4 * counts].view(np.uint32).reshape(len(span.tiles), -1)
         sums = rows.sum(axis=0, dtype=np.uint64).reshape(-1, len(STATISTICS)).sum(axis=0)
-        film = told(found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene)
-        return film, sums
+        framebuffer = told(
+            found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene
+        )
+        return framebuffer, sums
 
     def _divide(self, kernel: TileKernel, tiles: int) -> None:
         """Into packets, groups and waves."""

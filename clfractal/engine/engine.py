@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from clfractal.engine.preview import Preview
     from clfractal.engine.refine import Refinement
     from clfractal.engine.several import SeveralExecutor
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
     from clfractal.images.probe import Probe
 
 T = TypeVar("T")
@@ -41,7 +41,7 @@ class Engine(AnyEngine):
 
         with clfractal.Engine() as engine:
             for angle in range(60):
-                film = engine.render(turned(scene, angle))
+                framebuffer = engine.render(turned(scene, angle))
 
     Only one thread may use it at a time; a second one gets an error.
 
@@ -187,9 +187,10 @@ class Engine(AnyEngine):
         quality: str | None = None,
         token: CancelToken | None = None,
     ) -> Refinement:
-        """Films of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more samples.
+        """Framebuffers of a scene from coarse to finished: every 8th, 4th and 2nd pixel, then all with more and more
+        samples.
 
-        Each film has the full size. The last one has the same bits as `render`. Between passes the device keeps some
+        Each framebuffer has the full size. The last one has the same bits as `render`. Between passes the device keeps some
         70 bytes per pixel (twice that in float64); if they do not fit, all samples are made in one pass. In a
         notebook the result is shown, and redrawn with every pass.
 
@@ -199,7 +200,7 @@ class Engine(AnyEngine):
 
         check_token(token)
 
-        def films() -> Generator[Film]:
+        def framebuffers() -> Generator[Framebuffer]:
             with self._alone():
                 job = self.prepare(
                     scene,
@@ -212,7 +213,7 @@ class Engine(AnyEngine):
                 )
                 yield from refined(job, self.executor, token, previews_built_ms=self.previews_built_ms)
 
-        return Refinement(films())
+        return Refinement(framebuffers())
 
 
 def engine_on(device: str | Sequence[str] | None, executor: Elsewhere | None) -> AnyEngine:

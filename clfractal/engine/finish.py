@@ -13,7 +13,7 @@ from clfractal.device.activity import doing
 from clfractal.engine.job import Job
 from clfractal.files.channels import ALBEDO, NOISY, NORMAL
 from clfractal.images.denoise import denoised
-from clfractal.images.film import Film, in_memory
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.outputs import output_files, save_outputs, save_views
 from clfractal.images.tiled import Floats, Picture
 from clfractal.integrators.plan import PlannedView
@@ -82,21 +82,23 @@ def darkness_is_certain(scene: Scene) -> bool:
     )
 
 
-def _finished(job: Job, view: PlannedView, film: Film) -> Film:
-    colors = _stacked(film, ("R", "G", "B"))
-    if film.done.any():
-        aids = (ALBEDO, NORMAL) if set(ALBEDO) <= set(film.channels) else ()
+def _finished(job: Job, view: PlannedView, framebuffer: Framebuffer) -> Framebuffer:
+    colors = _stacked(framebuffer, ("R", "G", "B"))
+    if framebuffer.done.any():
+        aids = (ALBEDO, NORMAL) if set(ALBEDO) <= set(framebuffer.channels) else ()
         certain = view.shutter is None and darkness_is_certain(view.scene)
-        coverage = film["A"] if certain else None
-        clean = denoised(colors, *(_stacked(film, names) for names in aids), coverage=coverage)
+        coverage = framebuffer["A"] if certain else None
+        clean = denoised(colors, *(_stacked(framebuffer, names) for names in aids), coverage=coverage)
     else:
         clean = colors
     made = {
         **dict(zip(("R", "G", "B"), np.moveaxis(clean, -1, 0), strict=True)),
         **dict(zip(NOISY, np.moveaxis(colors, -1, 0), strict=True)),
     }
-    return film.with_planes({name: made[name] if name in made else film[name] for name in job.channels})
+    return framebuffer.with_planes(
+        {name: made[name] if name in made else framebuffer[name] for name in job.channels}
+    )
 
 
-def _stacked(film: Film, names: Sequence[str]) -> Floats:
-    return np.stack([film[name] for name in names], axis=-1)
+def _stacked(framebuffer: Framebuffer, names: Sequence[str]) -> Floats:
+    return np.stack([framebuffer[name] for name in names], axis=-1)

@@ -16,7 +16,7 @@ from clfractal.scene.movement import movement_of
 
 if TYPE_CHECKING:
     from clfractal.engine.run import ProgressCallback
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
 
 
 def at_frame(scene: Scene | str | Path | Mapping[str, Any], frame: float) -> Scene:
@@ -27,7 +27,7 @@ def at_frame(scene: Scene | str | Path | Mapping[str, Any], frame: float) -> Sce
         frame: counted from 0; it may lie between two frames.
 
     Raises:
-        SceneError: the scene has no animation, the film no such frame, or a value is out of its range then.
+        SceneError: the scene has no animation, the framebuffer no such frame, or a value is out of its range then.
     """
     found = as_scene(scene)
     movement = movement_of(found)
@@ -87,11 +87,11 @@ def frames(
     channels: Sequence[str] | None = None,
     quality: str | None = None,
     executor: Elsewhere | None = None,
-) -> Iterator[tuple[int, Film]]:
+) -> Iterator[tuple[int, Framebuffer]]:
     """Renders the frames of a scene's animation, one after the other, in one engine.
 
-        for number, film in clfractal.frames("dive.yaml"):
-            film.save(f"frame_{number:04}.exr")
+        for number, framebuffer in clfractal.frames("dive.yaml"):
+            framebuffer.save(f"frame_{number:04}.exr")
 
     Nothing is rendered before the first frame is asked for; who stops early loses nothing.
 
@@ -101,7 +101,7 @@ def frames(
         device, progress, precision, samples, size, channels, quality, executor: as for `clfractal.render`, for each frame.
 
     Returns:
-        An iterator of pairs: the frame's number, and its film.
+        An iterator of pairs: the frame's number, and its framebuffer.
 
     Raises:
         SceneError, FormulaError: the scene, its animation or a setting is wrong.
@@ -110,10 +110,10 @@ def frames(
     found = as_scene(scene)
     wanted = _wanted(numbers, movement_of(found).animation.count)
 
-    def rendered() -> Iterator[tuple[int, Film]]:
+    def rendered() -> Iterator[tuple[int, Framebuffer]]:
         with engine_on(device, executor) as engine:
             scenes = FilmScenes(engine, found)
-            films = engine.render_in_order(
+            framebuffers = engine.render_in_order(
                 map(scenes.scene, wanted),
                 progress,
                 precision=precision,
@@ -123,8 +123,8 @@ def frames(
                 quality=quality,
                 pictures=len(wanted),
             )
-            with closing(films):
-                yield from zip(wanted, films, strict=True)
+            with closing(framebuffers):
+                yield from zip(wanted, framebuffers, strict=True)
 
     return rendered()
 

@@ -15,7 +15,7 @@ from clfractal.camera.views import scene_view
 from clfractal.engine.engine import Engine
 from clfractal.engine.preview import points_of_depth
 from clfractal.errors import SceneError, Where
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -182,15 +182,15 @@ class _Finder:
         }
         return load_scene(data, folder=self.folder)
 
-    def preview(self, scene: Scene, *channels: str) -> Film:
+    def preview(self, scene: Scene, *channels: str) -> Framebuffer:
         return self.engine.render(scene, samples=1, channels=channels)
 
     def iterations(self, camera: Mapping[str, Any]) -> int:
         """The most applications of those that are tried that leave a form: neither noise nor dust."""
         found = _COUNTS[0]
         for count in _COUNTS:
-            film = self.preview(self.scene(count, camera), *_NORMALS)
-            if (film["A"] > 0.5).mean() < _LEAST_COVERED or _roughness(film) > _ROUGHEST:
+            framebuffer = self.preview(self.scene(count, camera), *_NORMALS)
+            if (framebuffer["A"] > 0.5).mean() < _LEAST_COVERED or _roughness(framebuffer) > _ROUGHEST:
                 break
             found = count
         return found
@@ -226,16 +226,16 @@ class _Finder:
     def _has_room(self, iterations: int, camera: Mapping[str, Any]) -> bool:
         """Whether a camera is outside the set, and not right before it."""
         scene = self.scene(iterations, camera)
-        film = self.preview(scene, "Z", "A")
-        depth = film["Z"][film["A"] > 0.5] / self.radius
-        if inside_solid(scene, [scene.camera.position])[0] or len(depth) < 0.3 * film["A"].size:
+        framebuffer = self.preview(scene, "Z", "A")
+        depth = framebuffer["Z"][framebuffer["A"] > 0.5] / self.radius
+        if inside_solid(scene, [scene.camera.position])[0] or len(depth) < 0.3 * framebuffer["A"].size:
             return False
         near, middle = np.percentile(depth, (5, 50))
         return bool(near > _NEAREST and middle > _MIDDLE)
 
     def _points(self, scene: Scene) -> Floats:
-        film = self.preview(scene, "Z")
-        return points_of_depth(scene_view(scene), film["Z"], film.display)
+        framebuffer = self.preview(scene, "Z")
+        return points_of_depth(scene_view(scene), framebuffer["Z"], framebuffer.display)
 
     def cameras(self, iterations: int) -> Iterator[dict[str, Any]]:
         """Cameras from several sides, each so far away that the set fills the picture."""
@@ -255,11 +255,11 @@ class _Finder:
         """How much there is to see: light and shade, and how much of the picture the set covers."""
         scene = self.scene(iterations, camera)
         warm = {"direction": list(_lights(scene)[0])}
-        film = self.preview(self.scene(iterations, camera, lights=[warm]), "R", "G", "B", "A")
-        covered = film["A"] > 0.5
+        framebuffer = self.preview(self.scene(iterations, camera, lights=[warm]), "R", "G", "B", "A")
+        covered = framebuffer["A"] > 0.5
         if covered.mean() < 0.02:
             return 0.0
-        light = film.to_rgb8().astype(float).mean(axis=-1)
+        light = framebuffer.to_rgb8().astype(float).mean(axis=-1)
         inner = np.abs(np.diff(light, axis=1))[covered[:, 1:] & covered[:, :-1]]
         part = min(1.0, float(covered.mean()) / 0.4)
         return float(light[covered].std() + inner.mean()) * math.sqrt(part)
@@ -272,8 +272,8 @@ class _Finder:
             "material": {"ambient": 1, "diffuse": 0, "specular": 0},
             "coloring": {"by": "trap", "palette": ["#000", "#fff"], "scale": 1 / widest, "repeat": False},
         }
-        film = self.preview(self.scene(iterations, camera, **flat), "R", "A")
-        values = film["R"][film["A"] > 0.5] * widest
+        framebuffer = self.preview(self.scene(iterations, camera, **flat), "R", "A")
+        values = framebuffer["R"][framebuffer["A"] > 0.5] * widest
         low, high = np.percentile(values, (3, 97))
         scale = 1 / max(high - low, 1e-3 * widest)
         return _short(scale), _short(-low * scale)
@@ -286,8 +286,10 @@ class _Finder:
             for name, section in found.sections().items()
             if name not in ("camera", "image", "renderer")
         }
-        film = self.preview(self.scene(found.iterations, camera, **sections), "R", "G", "B", "A")
-        light = np.asarray(film, np.float64)[film["A"] > 0.5] @ np.array([0.2126, 0.7152, 0.0722])
+        framebuffer = self.preview(self.scene(found.iterations, camera, **sections), "R", "G", "B", "A")
+        light = np.asarray(framebuffer, np.float64)[framebuffer["A"] > 0.5] @ np.array(
+            [0.2126, 0.7152, 0.0722]
+        )
         lightest = float(np.percentile(light, 97)) if len(light) else 0.0
         stops = math.log2(_BRIGHT / lightest) if lightest > 0 else 0.0
         return replace(found, exposure=round(min(max(stops, -1.5), 2.0), 1))
@@ -324,10 +326,12 @@ def _filled(camera: Mapping[str, Any], scene: Scene, points: Floats) -> dict[str
     return {**camera, "target": target, "orbit": {**camera["orbit"], "distance": _rounded(distance, fine)}}
 
 
-def _roughness(film: Film) -> float:
+def _roughness(framebuffer: Framebuffer) -> float:
     """The median angle between the normals of pixels beside each other, degrees, where both show the set."""
-    normals = np.stack([film["N.X"], film["N.Y"], film["N.Z"]], axis=-1).astype(np.float64)
-    hit = film["A"] > 0.5
+    normals = np.stack([framebuffer["N.X"], framebuffer["N.Y"], framebuffer["N.Z"]], axis=-1).astype(
+        np.float64
+    )
+    hit = framebuffer["A"] > 0.5
     cosines = np.sum(normals[:, 1:] * normals[:, :-1], axis=-1)[hit[:, 1:] & hit[:, :-1]]
     median = float(np.median(cosines)) if len(cosines) else 1.0
     return math.degrees(math.acos(min(max(median, -1.0), 1.0)))

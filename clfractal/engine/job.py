@@ -18,10 +18,10 @@ from clfractal.files.channels import CHANNELS
 from clfractal.files.document import write_document
 from clfractal.images.compose import APART, Composed, Side
 from clfractal.images.denoise import NAME
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.paste import Pasted
 from clfractal.images.provenance import lines_of
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
 from clfractal.images.tiles import Region, TileGrid
 from clfractal.integrators.plan import PlannedView
@@ -29,7 +29,7 @@ from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.standing import standing_alone
 from clfractal.scene.stereo import Stereo
-from clfractal.shading.mattes import attributes
+from clfractal.shading.cryptomatte import attributes
 
 # Settings for showing a pair, which do not change either eye's picture.
 _SHOWN = ("mode", "swap", "method", "glasses", "colors")
@@ -188,7 +188,7 @@ class Job:
         return plain
 
     def header(self) -> dict[str, Any]:
-        """The header of the whole picture's files (see `Film`); `seconds` is added when it is known."""
+        """The header of the whole picture's files (see `Framebuffer`); `seconds` is added when it is known."""
         scene = self.scene
         camera = scene_view(scene)
         devices = [self.device, *(kind.device for kind in self.others)]
@@ -322,7 +322,7 @@ class Job:
 
 def _provenance_of(stores: Sequence[Picture]) -> dict[str, str]:
     """A header's entry for the devices that made the views of a picture, if several did."""
-    tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
+    tiled = [store for store in stores if isinstance(store, (Framebuffer, JournalFramebuffer))]
     lines = lines_of(store.provenance.counts(store.done) for store in tiled)
     return {"devices": lines} if lines else {}
 

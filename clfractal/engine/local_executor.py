@@ -30,7 +30,7 @@ Supply = Callable[[int], Tiles]
 """Gives the tiles of a launch, at most so many; none if there are no more."""
 
 _NO_TILES = np.zeros(0, np.int32)
-_NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
+_NO_PIXELS = np.zeros((0, 0, TILE, TILE), np.float32)
 
 # Device memory for what samples of scenes of their own keep for the next one, unless a picture is made in passes.
 _KEPT_BETWEEN_SAMPLES = 256 << 20
@@ -52,8 +52,8 @@ class LocalExecutor:
         budget_seconds: limit of the work that is queued on the device: cancelled work ends after about this time.
         tell: called with a message if a program has to be compiled first, or if something does not fit.
 
-    `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no films and no statistics.
-    `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
+    `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no framebuffers and no
+    statistics. `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
     `waits` is whether programs are built and grids filled that are not there yet; else there is `NotReady`.
     """
 
@@ -249,16 +249,16 @@ def _launched(
             counters.kernel_ms += milliseconds
             if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                 # Only a part of a tile is done: there is nothing to read yet.
-                yield Result(item.view, _NO_TILES, _NO_FILM, counters)
+                yield Result(item.view, _NO_TILES, _NO_PIXELS, counters)
             elif outlet is not None and last:
                 # Only now: a launch that was cancelled has left unfinished tiles.
                 drawing.hand_over(span, outlet)
-                yield Result(item.view, span.tiles, _NO_FILM, counters)
+                yield Result(item.view, span.tiles, _NO_PIXELS, counters)
             else:
-                film, sums = drawing.collect(span)
+                framebuffer, sums = drawing.collect(span)
                 for name, count in zip(STATISTICS, sums, strict=True):
                     setattr(counters, name, int(count))
-                done = (span.tiles, film) if last else (_NO_TILES, _NO_FILM)
+                done = (span.tiles, framebuffer) if last else (_NO_TILES, _NO_PIXELS)
                 yield Result(item.view, *done, counters)
             counters = Counters()
 

@@ -29,7 +29,7 @@ from clfractal.scene.surface import SurfaceRenderer
 MAX_SAMPLES = 65_536
 MEASURED_FIRST_SECONDS = 30.0
 """A device that is not measured yet is measured before pictures that probably take so long, and not before others."""
-_SHOTS_A_SECOND = 1e6  # of a compute unit, about: half to twice as many by direct light
+_SAMPLES_A_SECOND = 1e6  # of a compute unit, about: half to twice as many by direct light
 PRECISIONS = ("auto", "float32", "float64")
 
 
@@ -86,8 +86,8 @@ def prepare(
             if needed is None:
                 continue
             check_layers(view, names, where)
-            shots = samples if samples is not None else view.renderer.samples
-            plan = Plan(chosen[number], 1, shots, needed, _rendered(view, names))
+            taken = samples if samples is not None else view.renderer.samples
+            plan = Plan(chosen[number], 1, taken, needed, _rendered(view, names))
             numbers.append(len(views))
             places.append(place)
             planned = PlannedView(view, plan, own_eye, number)
@@ -176,12 +176,12 @@ def lanes_of(
 
 def pays_to_measure(views: Sequence[PlannedView], device: Device, pictures: int = 1) -> bool:
     """Whether a device that is not measured yet is measured before a job: the job probably takes much longer."""
-    shots = sum(
+    taken = sum(
         view.plan.region.pixels * view.plan.samples * (1 + bounces(view.scene))
         for view in views
         if isinstance(view.scene.renderer, SurfaceRenderer)
     )
-    seconds = pictures * shots / (_SHOTS_A_SECOND * max(device.info.compute_units, 1))
+    seconds = pictures * taken / (_SAMPLES_A_SECOND * max(device.info.compute_units, 1))
     return seconds >= MEASURED_FIRST_SECONDS
 
 

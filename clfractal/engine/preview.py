@@ -15,7 +15,7 @@ from clfractal.engine.job import Identity, Job
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import Executor, run
 from clfractal.files.channels import RAY_CHANNELS
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiles import Region
 from clfractal.integrators.plan import PlannedView
 from clfractal.scene.model import Scene
@@ -37,7 +37,7 @@ class Preview:
     def __init__(self, device: Device, executor: Executor) -> None:
         self.device, self.executor = device, executor
 
-    def film(self, scene: Scene, eye: Eye = MIDDLE) -> Film:
+    def framebuffer(self, scene: Scene, eye: Eye = MIDDLE) -> Framebuffer:
         """What an eye sees of a scene with one view: a small picture with R, G, B, A and Z, one sample per pixel.
 
         Raises:
@@ -51,8 +51,8 @@ class Preview:
         Raises:
             DeviceError, KernelBuildError: as of a render.
         """
-        film = self.film(scene, eye)
-        return points_of_depth(scene_view(_small(scene), eye), film["Z"], film.display)
+        framebuffer = self.framebuffer(scene, eye)
+        return points_of_depth(scene_view(_small(scene), eye), framebuffer["Z"], framebuffer.display)
 
     def depth(self, scene: Scene, place: tuple[float, float], eye: Eye = MIDDLE) -> float | None:
         """The depth of what lies nearest to a place of the picture, along the view axis, scene units; None if it is empty.
@@ -72,7 +72,7 @@ class Preview:
         exact = self.pixel(job, view, x, y)["Z"]
         if 0 < exact < np.inf:
             return exact
-        small = self.film(scene, eye)
+        small = self.framebuffer(scene, eye)
         rows, columns = np.nonzero(np.isfinite(small["Z"]) & (small["Z"] > 0))
         if not len(rows):
             return None
@@ -89,8 +89,8 @@ class Preview:
         """
         plan = replace(view.plan, samples=1, region=Region(x, y, 1, 1), channels=RAY_CHANNELS, divider=1)
         closed = replace(view, scene=_with_closed_lens(view.scene), plan=plan)
-        film = self._rendered(job, closed)
-        return {name: float(film[name][0, 0]) for name in film}
+        framebuffer = self._rendered(job, closed)
+        return {name: float(framebuffer[name][0, 0]) for name in framebuffer}
 
     def _planned(self, scene: Scene, eye: Eye) -> tuple[Job, PlannedView]:
         """The view of any eye, with a job for it."""
@@ -101,10 +101,10 @@ class Preview:
         job = prepare(closed.model_copy(update=alone), self.device, samples=1, channels=_CHANNELS)
         return job, replace(job.views[0], scene=closed, eye=eye)
 
-    def _rendered(self, job: Job, view: PlannedView) -> Film:
-        film = Film(view.plan.channels, view.size, view.plan.region)
-        run(replace(job, views=(view,), composition=Identity(0)), [film], self.executor)
-        return film
+    def _rendered(self, job: Job, view: PlannedView) -> Framebuffer:
+        framebuffer = Framebuffer(view.plan.channels, view.size, view.plan.region)
+        run(replace(job, views=(view,), composition=Identity(0)), [framebuffer], self.executor)
+        return framebuffer
 
 
 def points_of_depth(

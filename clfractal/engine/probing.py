@@ -10,7 +10,7 @@ from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.preview import Preview
 from clfractal.errors import SceneError, Where, arguments
 from clfractal.images.compose import Side
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.modes import eye_at
 from clfractal.images.probe import CHANNELS, Probe, probe_of
 from clfractal.images.tiles import Region
@@ -77,26 +77,27 @@ def checked_pixel(x: object, y: object, region: Region) -> tuple[int, int]:
 
 
 @dataclass(frozen=True, slots=True)
-class FilmProber:
-    """Answers `Film.probe`: from the film's channels if they are enough, else by a ray on the film's device.
+class FramebufferProber:
+    """Answers `Framebuffer.probe`: from the framebuffer's channels if they are enough, else by a ray on the
+    framebuffer's device.
 
     Attributes:
-        job: what the film shows.
-        side: the eye, if the film is one eye's picture.
+        job: what the framebuffer shows.
+        side: the eye, if the framebuffer is one eye's picture.
     """
 
     job: Job
     side: Side | None = None
 
-    def __call__(self, film: Film, x: int, y: int) -> Probe:
-        """What lies at a pixel; see `Film.probe`."""
-        column, row = checked_pixel(x, y, film.region)
-        if not set(CHANNELS) <= set(film.channels):
+    def __call__(self, framebuffer: Framebuffer, x: int, y: int) -> Probe:
+        """What lies at a pixel; see `Framebuffer.probe`."""
+        column, row = checked_pixel(x, y, framebuffer.region)
+        if not set(CHANNELS) <= set(framebuffer.channels):
             device = by_key(self.job.device.index, self.job.device.key)
             return probed(self.job, column, row, Preview(device, LocalExecutor(device)), self.side)
         place = _shown_place(self.job, column, row, self.side)
-        at = row - film.region.y, column - film.region.x
-        values = {name: float(film[name][at]) for name in CHANNELS}
+        at = row - framebuffer.region.y, column - framebuffer.region.x
+        values = {name: float(framebuffer[name][at]) for name in CHANNELS}
         camera = self.job.views[place.view].camera
         return probe_of(values, camera, x=column, y=row, view=_number(self.job, place), eye=place.eye)
 

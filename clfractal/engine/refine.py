@@ -13,11 +13,11 @@ import numpy as np
 
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms, Took
+from clfractal.engine.job_framebuffers import JobFramebuffers, Took
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Counters, Progress, run
 from clfractal.errors import DeviceError
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 
 if TYPE_CHECKING:
     from clfractal.engine.several import SeveralExecutor
@@ -29,27 +29,27 @@ Later passes do not reuse these pixels: a packet of which a quarter of the lanes
 """
 
 
-class Refinement(Iterator[Film]):
-    """Films from coarse to finished: see `Engine.refine`. A notebook shows it, and redraws it with every pass."""
+class Refinement(Iterator[Framebuffer]):
+    """Framebuffers from coarse to finished: see `Engine.refine`. A notebook shows it, and redraws it with every pass."""
 
-    def __init__(self, films: Generator[Film]) -> None:
-        self._films = films
+    def __init__(self, framebuffers: Generator[Framebuffer]) -> None:
+        self._framebuffers = framebuffers
 
-    def __next__(self) -> Film:
-        return next(self._films)
+    def __next__(self) -> Framebuffer:
+        return next(self._framebuffers)
 
     def close(self) -> None:
         """Ends the refinement before its last pass; the engine can then be used again."""
-        self._films.close()
+        self._framebuffers.close()
 
     def _ipython_display_(self) -> None:
         display = import_module("IPython.display").display
         handle = None
-        for film in self:
+        for framebuffer in self:
             if handle is None:
-                handle = display(film, display_id=True)
+                handle = display(framebuffer, display_id=True)
             else:
-                handle.update(film)
+                handle.update(framebuffer)
 
 
 def refined(
@@ -58,11 +58,11 @@ def refined(
     token: CancelToken | None = None,
     *,
     previews_built_ms: float = 0.0,
-) -> Generator[Film]:
-    """The passes of a job, each as a film of the whole picture. The last one has the same bits as `run`.
+) -> Generator[Framebuffer]:
+    """The passes of a job, each as a framebuffer of the whole picture. The last one has the same bits as `run`.
 
     Args:
-        previews_built_ms: for the films' statistics, see `Took`.
+        previews_built_ms: for the framebuffers' statistics, see `Took`.
 
     Raises:
         DeviceError, KernelBuildError, Stopped: as of `run`.
@@ -70,42 +70,46 @@ def refined(
     start, total, seconds = time.perf_counter(), Counters(), 0.0
     of_views = [Counters() for _ in job.views]
 
-    def passed(films: JobFilms, samples: tuple[int, int] | None = None) -> Progress:
+    def passed(framebuffers: JobFramebuffers, samples: tuple[int, int] | None = None) -> Progress:
         """Makes one pass, and gives the counts and times of all passes so far."""
         nonlocal seconds
-        state = run(films.job, films.films, executor, token=token, samples=samples)
+        state = run(framebuffers.job, framebuffers.framebuffers, executor, token=token, samples=samples)
         seconds += state.seconds
         total.add(state)
         for so_far, new in zip(of_views, state.views, strict=True):
             so_far.add(new)
         return replace(state, **asdict(total), views=[replace(each) for each in of_views])
 
-    def shown(films: JobFilms, state: Progress, stage: str) -> Film:
-        film = films.picture(Took(state, 1e3 * (time.perf_counter() - start), previews_built_ms))
-        film.tell("seconds", seconds)
-        film.stage = stage
-        return film
+    def shown(framebuffers: JobFramebuffers, state: Progress, stage: str) -> Framebuffer:
+        framebuffer = framebuffers.picture(
+            Took(state, 1e3 * (time.perf_counter() - start), previews_built_ms)
+        )
+        framebuffer.tell("seconds", seconds)
+        framebuffer.stage = stage
+        return framebuffer
 
     try:
         for divider in DIVIDERS:
             coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
-            small = JobFilms(coarse)
+            small = JobFramebuffers(coarse)
             state = passed(small)
-            whole = JobFilms(job)
-            for film, found in zip(whole.films, small.films, strict=True):
-                _enlarge(found, film, divider)
+            whole = JobFramebuffers(job)
+            for framebuffer, found in zip(whole.framebuffers, small.framebuffers, strict=True):
+                _enlarge(found, framebuffer, divider)
             stage = {8: "8th", 4: "4th", 2: "2nd"}[divider]
             yield shown(whole, state, f"every {stage} pixel")
         ranges = pass_ranges(job.samples) if has_room(job, executor, token) else [(0, job.samples)]
-        films = JobFilms(job)
+        framebuffers = JobFramebuffers(job)
         for samples in ranges:
-            before, films = films, JobFilms(job)
-            for view, film, old in zip(job.views, films.films, before.films, strict=True):
+            before, framebuffers = framebuffers, JobFramebuffers(job)
+            for view, framebuffer, old in zip(
+                job.views, framebuffers.framebuffers, before.framebuffers, strict=True
+            ):
                 if view.plan.samples <= samples[0]:  # finished before the others
-                    film.take(old)
-            state = passed(films, samples)
+                    framebuffer.take(old)
+            state = passed(framebuffers, samples)
             last = samples[1] == job.samples
-            yield shown(films, state, "" if last else f"{samples[1]} of {job.samples} samples")
+            yield shown(framebuffers, state, "" if last else f"{samples[1]} of {job.samples} samples")
     finally:
         executor.forget()
 
@@ -135,8 +139,8 @@ def has_room(job: Job, executor: LocalExecutor | SeveralExecutor, token: CancelT
     return True
 
 
-def _enlarge(small: Film, whole: Film, divider: int) -> None:
-    """Copies each pixel of a coarse film to all the pixels that it stands for."""
+def _enlarge(small: Framebuffer, whole: Framebuffer, divider: int) -> None:
+    """Copies each pixel of a coarse framebuffer to all the pixels that it stands for."""
     region = whole.region
     rows = np.arange(region.y, region.bottom) // divider - small.region.y
     columns = np.arange(region.x, region.right) // divider - small.region.x

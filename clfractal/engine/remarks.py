@@ -16,8 +16,8 @@ import numpy.typing as npt
 from clfractal.camera.views import View
 from clfractal.engine.job import Job
 from clfractal.engine.run import Progress
-from clfractal.images.film import Film
-from clfractal.images.store import JournalFilm
+from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
 from clfractal.images.tiles import Region
 from clfractal.integrators.plan import PlannedView
@@ -115,7 +115,7 @@ def _of_keys(scene: Scene) -> list[str]:
 
 def _of_kinds(stores: Sequence[Picture]) -> list[str]:
     """That devices of several kinds have made parts of a picture."""
-    tiled = [store for store in stores if isinstance(store, (Film, JournalFilm))]
+    tiled = [store for store in stores if isinstance(store, (Framebuffer, JournalFramebuffer))]
     render_devices = {each.key: each for store in tiled for each in store.provenance.counts(store.done)}
     return [mixed_kinds(len(render_devices))] if len(render_devices) > 1 else []
 

@@ -74,7 +74,7 @@ class Result:
     Attributes:
         view: number of the view in the job.
         tiles: indices of the tiles.
-        film: their channels, shape (tiles, channels, TILE, TILE).
+        framebuffer: their channels, shape (tiles, channels, TILE, TILE).
         counters: see `Counters`.
         render_device: the device that made them, where several do a job.
         remark: what the user should know about the work, or empty.
@@ -82,7 +82,7 @@ class Result:
 
     view: int
     tiles: Tiles
-    film: Floats
+    framebuffer: Floats
     counters: Counters
     render_device: RenderDevice | None = None
     remark: str = ""
@@ -198,7 +198,7 @@ def run(
             elif store.provenance.known:  # an earlier run had several devices
                 render_device = RenderDevice.of(job.device.index, job.device.name, job.device.key)
             if len(result.tiles):
-                store.put_tiles(result.tiles, result.film, render_device)
+                store.put_tiles(result.tiles, result.framebuffer, render_device)
             if result.remark:
                 state.remarks.append(result.remark)
             state.tiles_done += len(result.tiles)

@@ -20,7 +20,7 @@ from clfractal.scene.stereo import Eye
 
 if TYPE_CHECKING:
     from clfractal.engine.preview import Preview
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
 
 Floats = npt.NDArray[np.float64]
 Camera = PerspectiveCamera | OrthographicCamera
@@ -93,15 +93,17 @@ def exposed(scene: Scene, preview: Preview) -> Scene:
     """
     if not isinstance(scene.output.exposure, str):
         return scene
-    seen = [preview.film(view, eye) for view, eye in _middle_views(scene)]
+    seen = [preview.framebuffer(view, eye) for view, eye in _middle_views(scene)]
     output = scene.output.model_copy(update={"exposure": exposure_of(seen)})
     return scene.model_copy(update={"output": output})
 
 
-def exposure_of(films: Sequence[Film]) -> float:
+def exposure_of(framebuffers: Sequence[Framebuffer]) -> float:
     """The exposure that suits pictures with R, G, B and A, stops; 0 if they are black. See `exposed`."""
-    colors = np.concatenate([np.stack([film[name].ravel() for name in "RGB"], axis=-1) for film in films])
-    cover = np.concatenate([film["A"].ravel() for film in films])
+    colors = np.concatenate(
+        [np.stack([framebuffer[name].ravel() for name in "RGB"], axis=-1) for framebuffer in framebuffers]
+    )
+    cover = np.concatenate([framebuffer["A"].ravel() for framebuffer in framebuffers])
     seen = cover > 0.5
     chosen = colors[seen] if seen.mean() >= _LEAST_SEEN else colors
     bright = chosen.astype(np.float64) @ _LUMINANCE

@@ -27,7 +27,7 @@ from clfractal.images.tiles import TILE, TileGrid
 # For so long a finished picture waits for programs that are being compiled for the next one, seconds.
 _LONGEST_BUILD = 600.0
 _NO_TILES = np.zeros(0, np.int32)
-_NO_FILM = np.zeros((0, 0, TILE, TILE), np.float32)
+_NO_PIXELS = np.zeros((0, 0, TILE, TILE), np.float32)
 
 
 class SeveralExecutor:
@@ -303,7 +303,7 @@ def _silent(device: Device, seconds: float) -> DeviceError:
 
 
 def _remark(line: str) -> Result:
-    return Result(0, _NO_TILES, _NO_FILM, Counters(), remark=line)
+    return Result(0, _NO_TILES, _NO_PIXELS, Counters(), remark=line)
 
 
 def _is_of_text(error: DeviceError | KernelBuildError) -> bool:

@@ -1,4 +1,4 @@
-"""The statistics of a render: what `--stats` writes, `--verbose` shows and `film.stats` holds."""
+"""The statistics of a render: what `--stats` writes, `--verbose` shows and `framebuffer.stats` holds."""
 
 from __future__ import annotations
 

@@ -26,7 +26,7 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 
 if TYPE_CHECKING:
-    from clfractal.images.film import Film
+    from clfractal.images.framebuffer import Framebuffer
 
 KINDS: tuple[Kind, ...] = get_args(Kind)
 STRENGTHS: tuple[Strength, ...] = get_args(Strength)
@@ -251,15 +251,15 @@ def _coarse(renderer: Any) -> Any:
     return renderer.model_copy(update=update)
 
 
-def worthwhile(film: Film) -> bool:
+def worthwhile(framebuffer: Framebuffer) -> bool:
     """Whether a small picture shows something: neither nothing, nor the flat inside of a solid, nor darkness.
 
     Args:
-        film: with R, G, B, and A if what is covered shall count; `PREVIEW_SIZE` is large enough.
+        framebuffer: with R, G, B, and A if what is covered shall count; `PREVIEW_SIZE` is large enough.
     """
-    code = film.to_rgb8().astype(np.float64)
+    code = framebuffer.to_rgb8().astype(np.float64)
     lightness = code @ np.array([0.2126, 0.7152, 0.0722])
-    covered = film["A"] > 0.5 if "A" in film else np.ones(lightness.shape, bool)
+    covered = framebuffer["A"] > 0.5 if "A" in framebuffer else np.ones(lightness.shape, bool)
     if covered.mean() < _LEAST_COVERED:
         return False
     return float(lightness[covered].std()) >= _LEAST_SPREAD

@@ -1,4 +1,4 @@
-"""The channels a picture may have: one table for scenes, films and files."""
+"""The channels a picture may have: one table for scenes, framebuffers and files."""
 
 from __future__ import annotations
 
@@ -36,15 +36,15 @@ def _layer(name: str, parts: str, description: str) -> tuple[Channel, ...]:
     )
 
 
-MATTE_RANKS = 6
+CRYPTOMATTE_RANKS = 6
 """Objects, and materials, whose coverage is known in each pixel."""
 
 
-def _matte(name: str, kind: str) -> tuple[Channel, ...]:
+def _cryptomatte(name: str, kind: str) -> tuple[Channel, ...]:
     """The channels of a Cryptomatte layer: two ranks each in `CryptoObject00`, `CryptoObject01` and so on."""
     parts = (
         (2 * pair + rank, f"{name}{pair:02d}.{'RGBA'[2 * rank + part]}", part)
-        for pair in range(MATTE_RANKS // 2)
+        for pair in range(CRYPTOMATTE_RANKS // 2)
         for rank in range(2)
         for part in range(2)
     )
@@ -89,8 +89,8 @@ _TABLE = (
         0.0,
         "number of the material: of `materials` in their order, from 1; after them `material`",
     ),
-    *_matte("CryptoObject", "object"),
-    *_matte("CryptoMaterial", "material"),
+    *_cryptomatte("CryptoObject", "object"),
+    *_cryptomatte("CryptoMaterial", "material"),
     *_layer("noisy", "RGB", "the picture before it was denoised"),
 )
 
@@ -110,14 +110,14 @@ LIGHT_LAYERS: tuple[str, ...] = (*layer("emission"), *layer("direct"), *layer("i
 SURFACE_LAYERS: tuple[str, ...] = (*ALBEDO, *LIGHT_LAYERS, *NORMAL)
 """Channels that only surfaces have, in the order of `parts` in `kernels/integrators/pixel.h`."""
 NUMBERED: tuple[str, ...] = ("object", "material")
-OBJECT_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoObject"))
-MATERIAL_MATTES: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoMaterial"))
-MATTES: tuple[str, ...] = (*NUMBERED, *OBJECT_MATTES, *MATERIAL_MATTES)
+CRYPTOMATTE_OBJECTS: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoObject"))
+CRYPTOMATTE_MATERIALS: tuple[str, ...] = tuple(name for name in CHANNELS if name.startswith("CryptoMaterial"))
+ID_CHANNELS: tuple[str, ...] = (*NUMBERED, *CRYPTOMATTE_OBJECTS, *CRYPTOMATTE_MATERIALS)
 """Channels that tell which things a pixel shows; only surfaces have them."""
 NOISY: tuple[str, ...] = layer("noisy")
 """The picture before it was denoised: made when all else is finished, never rendered."""
 RAY_CHANNELS: tuple[str, ...] = tuple(
-    name for name in CHANNELS if name not in {*SURFACE_LAYERS, *MATTES, *NOISY}
+    name for name in CHANNELS if name not in {*SURFACE_LAYERS, *ID_CHANNELS, *NOISY}
 )
 """The channels that every renderer makes."""
 
@@ -126,8 +126,8 @@ LAYERS: dict[str, tuple[str, ...]] = {
         name: layer(name)
         for name in ("N", "P", "albedo", "emission", "direct", "indirect", "normal", "noisy")
     },
-    "CryptoObject": OBJECT_MATTES,
-    "CryptoMaterial": MATERIAL_MATTES,
+    "CryptoObject": CRYPTOMATTE_OBJECTS,
+    "CryptoMaterial": CRYPTOMATTE_MATERIALS,
 }
 """Names that stand for several channels wherever a picture's channels are named."""
 

@@ -19,7 +19,7 @@ from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
 from clfractal.schema.base import Vector, frame_of, length
 from clfractal.schema.mapped import Map
 from clfractal.schema.shape import AXES, Level, ObjectBase, Simple, Solid
-from clfractal.shading.emitters import asked_radiance
+from clfractal.shading.emitters import sampled_radiance
 from clfractal.shading.maps import MappedMaterials, glass_bodies
 from clfractal.shading.materials import used_materials
 
@@ -53,8 +53,8 @@ OBJECT = Struct(
         Field("mirror", "real", 3, "part that is mirrored sharply, straight on"),
         Field("mirror_edge", "real", 3, "what is mirrored more at grazing angles"),
         Field("emission", "real", 3, "radiance, linear Rec. 709"),
-        Field("asked", "int", 0, "1: along paths it is asked for as lights are"),
-        Field("radiance", "real", 3, "of one that is asked for, linear Rec. 709"),
+        Field("sampled", "int", 0, "1: along paths it is sampled as lights are"),
+        Field("radiance", "real", 3, "of one that is sampled, linear Rec. 709"),
         Field("luminance", "real", 0, "of that"),
         Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
         Field("form", "real", 3, "of a shape: numbers of its own"),
@@ -109,13 +109,13 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
             "material": number,
             "glass": int(through) and (1 if clear else 2),
             **_place(scene, each),
-            **_look(scene, each),
-            **_asked(radiance),
+            **_phong_material(scene, each),
+            **_sampled(radiance),
             "colored": int(_has_color(scene, each)),
             **(grids.fields(name, grids_begin) if isinstance(each, VolumeObject) else NO_GRID),
         }
         for number, through, clear, radiance, (name, each) in zip(
-            numbers, glass, through_all, asked_radiance(scene), scene.objects.items(), strict=True
+            numbers, glass, through_all, sampled_radiance(scene), scene.objects.items(), strict=True
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
@@ -124,17 +124,17 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
     return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
 
 
-def _asked(radiance: Vector | None) -> dict[str, object]:
+def _sampled(radiance: Vector | None) -> dict[str, object]:
     """What `kernels/shading/emitters.h` reads, but for its place."""
     shines = radiance or (0.0, 0.0, 0.0)
     luminance = float(np.dot(shines, (0.2126, 0.7152, 0.0722)))  # ITU-R BT.709-6, item 3.2
-    return {"asked": int(radiance is not None), "radiance": shines, "luminance": luminance}
+    return {"sampled": int(radiance is not None), "radiance": shines, "luminance": luminance}
 
 
 def mirrors(scene: Scene) -> bool:
     """Whether any object mirrors in Phong's light."""
-    looks = [_look(scene, each) for each in scene.objects.values()]
-    return any(np.any(look["mirror"]) or np.any(look["mirror_edge"]) for look in looks)
+    materials = [_phong_material(scene, each) for each in scene.objects.values()]
+    return any(np.any(each["mirror"]) or np.any(each["mirror_edge"]) for each in materials)
 
 
 def _kind(each: ObjectBase) -> str:
@@ -201,11 +201,11 @@ def own_color(scene: Scene, each: ObjectBase) -> Vector | None:
     """The colour of an object's body, linear Rec. 709; None: it has the set's colouring."""
     if not _has_color(scene, each):
         return None
-    x, y, z = _look(scene, each)["color"]
+    x, y, z = _phong_material(scene, each)["color"]
     return (float(x), float(y), float(z))
 
 
-def _look(scene: Scene, each: ObjectBase) -> dict[str, Any]:
+def _phong_material(scene: Scene, each: ObjectBase) -> dict[str, Any]:
     """How it looks in Phong's light."""
     phong = scene.material
     if each.material is None:

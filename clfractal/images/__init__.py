@@ -1,1 +1,1 @@
-"""Finished pixels: tiles, films in memory and on disk, two eyes' pictures in one, files."""
+"""Finished pixels: tiles, framebuffers in memory and on disk, two eyes' pictures in one, files."""

@@ -1,8 +1,8 @@
 """Combines the two pictures of a stereo scene: side by side, interlaced, or as an anaglyph.
 
-Everything is in linear light (the film's, or developed for a screen), and in coordinates of the finished picture: a region
-equals the same part of the whole. A store of each eye's picture goes in, `Composed` comes out and is written like any other
-picture, a few rows at a time.
+Everything is in linear light (the framebuffer's, or developed for a screen), and in coordinates of the finished
+picture: a region equals the same part of the whole. A store of each eye's picture goes in, `Composed` comes out and is
+written like any other picture, a few rows at a time.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from clfractal.images.develop import Development, developed
-from clfractal.images.film import Film, in_memory
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.modes import BELOW, BESIDE, PICKED, eye_size, picture_size
 from clfractal.images.tiled import Bands, Floats, Picture
 from clfractal.images.tiles import Region
@@ -98,7 +98,7 @@ def compose(
 
 
 class Composed:
-    """The finished picture of two eyes' stores, made as it is read; see `Film` for its attributes.
+    """The finished picture of two eyes' stores, made as it is read; see `Framebuffer` for its attributes.
 
     Args:
         image: the scene's `image`, see `eye_size`.
@@ -179,7 +179,7 @@ class Composed:
                 yield row, planes
                 row += len(planes[self.channels[0]])
 
-    def to_film(self) -> Film:
+    def to_framebuffer(self) -> Framebuffer:
         """All of it in memory."""
         return in_memory(self)
 

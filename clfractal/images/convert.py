@@ -37,7 +37,7 @@ def to_xarray(picture: Picture, planes: Mapping[str, Floats]) -> Dataset:
     try:
         from xarray import Dataset
     except ImportError:
-        raise FileError("needs xarray: pip install xarray", Where("Film.to_xarray")) from None
+        raise FileError("needs xarray: pip install xarray", Where("Framebuffer.to_xarray")) from None
     region = picture.region
     coordinates = {
         "y": ("y", np.arange(region.y, region.bottom) + 0.5, {"units": "pixels"}),

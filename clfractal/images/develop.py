@@ -1,9 +1,9 @@
-"""Developing: from a film's light to light that a screen shows, by exposure and a tone curve.
+"""Developing: from a framebuffer's light to light that a screen shows, by exposure and a tone curve.
 
 Both are linear Rec. 709.
 
 Each eye's picture is developed before two are mixed in one. Files of display light (PNG, JPEG, WebP) and notebooks show
-developed pictures, and by the same steps the window does (`show.h`); an EXR holds the film's own light.
+developed pictures, and by the same steps the window does (`show.h`); an EXR holds the framebuffer's own light.
 """
 
 from __future__ import annotations
@@ -87,7 +87,7 @@ class Development:
 
 
 class Developed:
-    """A picture whose colours are developed as they are read; see `Film` for its attributes."""
+    """A picture whose colours are developed as they are read; see `Framebuffer` for its attributes."""
 
     def __init__(self, picture: Picture, development: Development) -> None:
         self.picture, self.development = picture, development

@@ -1,4 +1,4 @@
-"""Writes any kind of film to files."""
+"""Writes any kind of framebuffer to files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from clfractal.scene.stereo import APART, Stereo
 
 # Names of the header's keys in a file: OpenEXR's own names are kept, the others begin with the program's name.
 _MATRICES = ("worldToCamera", "worldToNDC")
-_OF_MATTES = "cryptomatte/"
+_CRYPTOMATTE = "cryptomatte/"
 _FILE_KEYS = {"scene": "clfractal"} | {name: name for name in (*_MATRICES, "view", "multiView")}
 # In a file with both eyes' pictures each has its own of these, with its view before the name.
 _OF_VIEWS = (*_MATRICES, "devices", "tileDevices")
@@ -41,7 +41,7 @@ def save_outputs(
     exposure: float | None = None,
     tone: Tone | None = None,
 ) -> None:
-    """Writes a film to files, in the formats of their extensions; each file appears complete or not at all.
+    """Writes a framebuffer to files, in the formats of their extensions; each file appears complete or not at all.
 
     All paths are checked before the first is written. Memory needed: a few bands of rows, see `bands`; for a JPEG or WebP
     3 or 4 bytes for each pixel, and the file.
@@ -51,8 +51,8 @@ def save_outputs(
         half: the channels that an EXR stores as half; by default as `CHANNELS` says.
         bits: 8 or 16, of a PNG.
         quality: 1 to 100, of a JPEG or WebP; at 100 a WebP is lossless.
-        transparent: whether a PNG or WebP has an alpha channel (the film's colours are premultiplied); needs A.
-        exposure: stops (powers of two) by which files but an EXR are lighter than the film; that keeps scene values.
+        transparent: whether a PNG or WebP has an alpha channel (the framebuffer's colours are premultiplied); needs A.
+        exposure: stops (powers of two) by which files but an EXR are lighter than the framebuffer; that keeps scene values.
         tone: the curve that its light goes through: linear, reinhard or agx.
             If they are None, the header's values are used.
 
@@ -190,7 +190,7 @@ def save_views(
 
 
 def png_bytes(store: Picture) -> bytes:
-    """An 8-bit PNG of a film, for notebooks; transparent where the film is."""
+    """An 8-bit PNG of a framebuffer, for notebooks; transparent where the framebuffer is."""
     stream = io.BytesIO()
     region = store.region
     alpha = _transparent(store, None)
@@ -222,7 +222,7 @@ def _file_key(key: str) -> str:
     view, dot, name = key.rpartition(".")
     if dot:
         return f"{view}.{_file_key(name)}"
-    if key.startswith(_OF_MATTES):
+    if key.startswith(_CRYPTOMATTE):
         return key  # as its specification says
     return _FILE_KEYS.get(key) or f"clfractal{key[:1].upper()}{key[1:]}"
 
@@ -232,16 +232,16 @@ def _software(header: Mapping[str, Any]) -> str:
 
 
 def _attributes(header: Mapping[str, Any]) -> dict[str, Any]:
-    """The film's header as attributes of an EXR file."""
+    """The framebuffer's header as attributes of an EXR file."""
     return {"software": _software(header)} | {
         _file_key(key): value for key, value in header.items() if value is not None
     }
 
 
 def _texts(header: Mapping[str, Any]) -> dict[str, str]:
-    """The film's header as text chunks of a PNG file; it has no place for matrices."""
+    """The framebuffer's header as text chunks of a PNG file; it has no place for matrices."""
     return {"Software": _software(header)} | {
         _file_key(key): str(value)
         for key, value in header.items()
-        if isinstance(value, str | bool | int | float | np.number) and not key.startswith(_OF_MATTES)
+        if isinstance(value, str | bool | int | float | np.number) and not key.startswith(_CRYPTOMATTE)
     }

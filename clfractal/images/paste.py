@@ -14,7 +14,7 @@ from clfractal.scene.layout import Place
 
 
 class Pasted:
-    """A picture of several; see `Film` for its attributes. It needs memory for some rows of each.
+    """A picture of several; see `Framebuffer` for its attributes. It needs memory for some rows of each.
 
     Args:
         stores: the views' pictures, each with the part of it that lies in the region; a later one covers earlier ones.

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.srgb import decode
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 
 Pixels: TypeAlias = npt.NDArray[np.uint8]
 
@@ -18,8 +18,8 @@ _GAP, _GREY = 8, 24
 _LETTERS, _LEAST_LETTERS, _MOST_LETTERS = 1 / 15, 10, 20
 
 
-def sheet_of(pictures: Sequence[Pixels], names: Sequence[str]) -> Film:
-    """All pictures in rows, as a film that any kind of picture file can be made of.
+def sheet_of(pictures: Sequence[Pixels], names: Sequence[str]) -> Framebuffer:
+    """All pictures in rows, as a framebuffer that any kind of picture file can be made of.
 
     The sheet has about as many rows as columns, but four columns at least if there are so many pictures.
 
@@ -44,6 +44,6 @@ def sheet_of(pictures: Sequence[Pixels], names: Sequence[str]) -> Film:
         place = (x + letters / 2, y + letters / 4)
         draw.text(place, name, font=font, fill="white", stroke_width=2, stroke_fill="black")
     light = decode(np.asarray(sheet, np.float64) / 255).astype(np.float32)
-    film = Film(("R", "G", "B"), size)
-    film.fill({channel: light[..., index] for index, channel in enumerate("RGB")})
-    return film
+    framebuffer = Framebuffer(("R", "G", "B"), size)
+    framebuffer.fill({channel: light[..., index] for index, channel in enumerate("RGB")})
+    return framebuffer

@@ -1,4 +1,4 @@
-"""Films that lie on disk while they are rendered."""
+"""Framebuffers that lie on disk while they are rendered."""
 
 from __future__ import annotations
 
@@ -11,16 +11,16 @@ import numpy.typing as npt
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
-from clfractal.images.film import Film, in_memory
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.provenance import Provenance, RenderDevice
 from clfractal.images.tiled import Bands, Floats, check_tile
 from clfractal.images.tiles import TILE, Region, TileGrid
 
 
-class JournalFilm:
-    """A film whose tiles are kept in a journal file: for resuming, and for pictures larger than memory.
+class JournalFramebuffer:
+    """A framebuffer whose tiles are kept in a journal file: for resuming, and for pictures larger than memory.
 
-    It keeps no pixel in memory; `bands` reads one row of tiles at a time. See `Film` for the header.
+    It keeps no pixel in memory; `bands` reads one row of tiles at a time. See `Framebuffer` for the header.
 
     Args:
         path: the journal, `OUT.partial` by custom.
@@ -91,7 +91,7 @@ class JournalFilm:
         self.provenance.of_tiles[tile_index] = number
 
     def put_tiles(
-        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+        self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
     ) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
 
@@ -101,7 +101,7 @@ class JournalFilm:
         Raises:
             FileError: the journal cannot be written (a full disk).
         """
-        for index, array in zip(indices.tolist(), film, strict=True):
+        for index, array in zip(indices.tolist(), framebuffer, strict=True):
             tile = self.grid.tile(index)
             top, left = tile.y % TILE, tile.x % TILE
             self.put(index, array[:, top : top + tile.height, left : left + tile.width], render_device)
@@ -136,7 +136,7 @@ class JournalFilm:
         found.of_tiles[:] = self.journal.provenance
         return found
 
-    def to_film(self) -> Film:
+    def to_framebuffer(self) -> Framebuffer:
         """All of it in memory; missing tiles have their channels' fill values."""
         return in_memory(self)
 
@@ -150,4 +150,4 @@ class JournalFilm:
 
     def __repr__(self) -> str:
         size = f"{self.display[0]}x{self.display[1]}"
-        return f"<JournalFilm {self.journal.path} {size}, {self.done.mean():.0%} done>"
+        return f"<JournalFramebuffer {self.journal.path} {size}, {self.done.mean():.0%} done>"

@@ -32,7 +32,7 @@ class Picture(Protocol):
 
     @property
     def header(self) -> dict[str, Any]:
-        """The header of picture files; see `Film`."""
+        """The header of picture files; see `Framebuffer`."""
 
     def bands(self) -> Bands:
         """The picture from top to bottom, some rows at a time; one row of tiles of a store.
@@ -58,7 +58,7 @@ class TiledStore(Picture, Protocol):
         """Which devices made the tiles, if several did."""
 
     def put_tiles(
-        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+        self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
     ) -> None:
         """Stores whole tiles: float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region.
 

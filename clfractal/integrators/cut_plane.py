@@ -8,9 +8,9 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText
 from clfractal.geometry.planes import CUT_PLANE, only_plane
 from clfractal.geometry.solids import Body
-from clfractal.integrators.carried import carried_text
 from clfractal.integrators.kernel import KernelArgument, ProgramText, TileKernel, flat_text
 from clfractal.integrators.passes import SAMPLING, pass_defines
+from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.records import VIEW
 from clfractal.integrators.surface import PALETTE_SIZE
@@ -37,7 +37,7 @@ def program_text(scene: Scene, plan: Plan, formula: Mapping[str, str] | None = N
     generated = {
         **formula,
         "structs.h": structs,
-        "carried.h": carried_text(),
+        "path_state.h": path_state_text(),
     }
     return flat_text("integrators/cut_plane.cl", generated=generated, defines=defines)
 

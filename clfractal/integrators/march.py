@@ -1,4 +1,4 @@
-"""The settings of the march and of a shot's rays, as kernels read them."""
+"""The settings of the march and of a sample's rays, as kernels read them."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from clfractal.integrators.state import PARTS, along_paths, normal_count
 from clfractal.integrators.waves import meets_objects, met_numbers
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.shading.emitters import asked_radiance
+from clfractal.shading.emitters import sampled_radiance
 from clfractal.shading.environment import PackedEnvironment
 from clfractal.shading.kind_numbers import FEATURES, NORMALS
 from clfractal.shading.maps import has_bump, has_glass, has_glass_set, has_subsurface, material_counts
@@ -88,7 +88,7 @@ MARCH = Struct(
         Field("set_count", "int", 0, "number of balls of lights on the set"),
         Field("set_cells", "int", 0, "cells of their probabilities along an edge of their cube"),
         Field("set_lists", "int", 0, "cells of their lists likewise"),
-        Field("set_rays", "int", 0, "shadow rays of a shot to them"),
+        Field("set_rays", "int", 0, "shadow rays of a sample to them"),
         Field("set_corner", "real", 3, "of their cube, scene units"),
         Field("set_edge", "real", 0, "its length"),
         Field("cosine_rays", "int", 0, "rays into the hemisphere, spread like the cosine"),
@@ -97,7 +97,7 @@ MARCH = Struct(
         Field("occlusion_distance", "real", 0, "how far an obstacle counts as occlusion, scene units"),
         Field("occlusion_share", "real", 0, "what one ray adds to the open part; 0: no ambient occlusion"),
         Field("asked_count", "int", 0, "quantities of materials for which the formula is asked"),
-        Field("bump_asked", "int", 0, "of those, from the first on: around spots too"),
+        Field("bump_asked", "int", 0, "of those, from the first on: around interactions too"),
         Field("bump_surface", "int", 0, "1: so are normals and escape counts"),
         Field("material_count", "int", 0, "materials, and blends of them"),
         Field("set_material", "int", 0, "the set's"),
@@ -145,7 +145,7 @@ def features_of(scene: Scene) -> int:
         "fog": scene.fog is not None,
         "bump": has_bump(scene),
         "paths": along_paths(scene),
-        "emitters": any(each is not None for each in asked_radiance(scene)),
+        "emitters": any(each is not None for each in sampled_radiance(scene)),
         "shining_clouds": any(each.transfer.emission is not None for each in clouds_of(scene)),
         "glass": has_glass(scene),
         "glass_set": has_glass_set(scene),
@@ -176,7 +176,7 @@ def march_record(
     on_set: SetLights | None = None,
     places: Sequence[int] | None = None,
 ) -> Record:
-    """The settings of the march, and of the rays that a shot sends.
+    """The settings of the march, and of the rays that a sample sends.
 
     A pixel stands for `divider` x `divider` of the picture's.
 

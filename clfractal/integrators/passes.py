@@ -10,7 +10,14 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.device.watched import CANCELLED
-from clfractal.files.channels import CHANNELS, MATTE_RANKS, MATTES, NUMBERED, RAY_CHANNELS, SURFACE_LAYERS
+from clfractal.files.channels import (
+    CHANNELS,
+    CRYPTOMATTE_RANKS,
+    ID_CHANNELS,
+    NUMBERED,
+    RAY_CHANNELS,
+    SURFACE_LAYERS,
+)
 from clfractal.images.tiles import TILE
 from clfractal.integrators.plan import Plan
 from clfractal.scene.sampled import Sampled
@@ -18,8 +25,8 @@ from clfractal.scene.sampled import Sampled
 SAMPLING = Struct(
     "Sampling",
     [
-        Field("samples", "int", 0, "shots per pixel, at most"),
-        Field("min_samples", "int", 0, "shots before the noise is judged"),
+        Field("samples", "int", 0, "samples per pixel, at most"),
+        Field("min_samples", "int", 0, "samples before the noise is judged"),
         Field("adaptive", "int", 0, "1: a pixel is done when it has little noise"),
         Field("noise", "real", 0, "standard error at which a pixel is done"),
         Field("transparent", "int", 0, "1: coverage is seen, so its noise counts too"),
@@ -40,7 +47,7 @@ STATISTICS = ("rays", "hits", "steps", "iterations", "bad_distances", "waits")
 PASS_KEEP = 1  # what pixels have so far is kept for a later pass
 PASS_ADD = 2  # statistics are added to those of the launch before
 
-# Numbers of a pixel that are kept between passes, in the order of `pixel`, `parts` and `mattes` in `pixel.h`,
+# Numbers of a pixel that are kept between passes, in the order of `pixel`, `parts` and `cryptomatte` in `pixel.h`,
 # and the channels that need them; with none they are always kept.
 _DATA = ("Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations", "steps")
 _OF_NOISE = ("brightness", "brightness_square", "coverage_square")
@@ -49,7 +56,7 @@ _KEPT: dict[str, tuple[str, ...]] = {
     "green": ("G",),
     "blue": ("B",),
     "coverage": ("A",),
-    "shots": (),
+    "samples": (),
     **dict.fromkeys(_OF_NOISE, ()),
     "nearest": (*_DATA, *NUMBERED),
     "depth": ("Z",),
@@ -58,8 +65,8 @@ _KEPT: dict[str, tuple[str, ...]] = {
     "smooth": ("iterations",),
     "steps": ("steps",),
     **{f"layer_{name.replace('.', '_').lower()}": (name,) for name in SURFACE_LAYERS},
-    **{f"matte_{number}": MATTES for number in range(2 * MATTE_RANKS)},
-    "matte_nearest": NUMBERED,
+    **{f"cryptomatte_{number}": ID_CHANNELS for number in range(2 * CRYPTOMATTE_RANKS)},
+    "cryptomatte_nearest": NUMBERED,
 }
 
 
@@ -72,7 +79,7 @@ def pass_defines(plan: Plan) -> dict[str, object]:
         **_numbered("CHANNEL", (name.replace(".", "") for name in CHANNELS)),
         "CHANNEL_COUNT": len(CHANNELS),
         "RAY_CHANNELS": len(RAY_CHANNELS),
-        "MATTE_RANKS": MATTE_RANKS,
+        "CRYPTOMATTE_RANKS": CRYPTOMATTE_RANKS,
         **_numbered("KEPT", _KEPT),
         **_numbered("STATISTIC", STATISTICS),
         "STATISTICS": len(STATISTICS),
@@ -86,9 +93,9 @@ def has_parts(plan: Plan) -> bool:
     return not set(SURFACE_LAYERS).isdisjoint(plan.channels)
 
 
-def has_mattes(plan: Plan) -> bool:
+def has_cryptomatte(plan: Plan) -> bool:
     """Whether the picture tells which things pixels show."""
-    return not set(MATTES).isdisjoint(plan.channels)
+    return not set(ID_CHANNELS).isdisjoint(plan.channels)
 
 
 def sampling_record(sampled: Sampled, samples: int, precision: Precision, *, transparent: bool) -> Record:

@@ -40,7 +40,7 @@ class Plan:
         lanes: rays a work-item carries.
         samples: rays per pixel.
         region: the part of the picture to render, in pixels.
-        channels: what the film holds, in order.
+        channels: what the framebuffer holds, in order.
         divider: n for a coarse picture, which has every nth pixel of the picture in each direction; the region is counted
             in these.
         moving: whether the view moves while the picture is taken.

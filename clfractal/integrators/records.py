@@ -76,7 +76,7 @@ LIGHT = Struct(
         Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
         Field("shadow", "int", 0, "1: blocked by the set"),
         Field("spread", "real", 0, "1 - cos of half its angular size"),
-        Field("rays", "int", 0, "shadow rays of a shot"),
+        Field("rays", "int", 0, "shadow rays of a sample"),
         Field("share", "real", 0, "one over that"),
         Field("axis", "real", 3, "of a spot's cone or a rectangle's shining side, length 1"),
         Field("side", "real", 3, "a rectangle's middle to its right rim, scene units"),
@@ -207,13 +207,15 @@ def bounces(scene: Scene) -> int:
 
 
 def light_rays(scene: Scene) -> int:
-    """Most shadow rays of a shot that a light has."""
+    """Most shadow rays of a sample that a light has."""
     return max((light.used_rays for light in single_lights(scene)), default=1)
 
 
 @dataclass(frozen=True, slots=True)
 class HemisphereRays:
-    """Rays of a shot into the hemisphere: spread like the cosine, like the environment's light, and whether that lights."""
+    """Rays of a sample into the hemisphere: spread like the cosine, like the environment's light, and whether that
+    lights.
+    """
 
     cosine: int
     map: int

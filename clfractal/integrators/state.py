@@ -11,31 +11,31 @@ from dataclasses import dataclass
 from itertools import accumulate
 
 from clfractal.geometry.planes import has_faces
-from clfractal.integrators.carried import (
+from clfractal.integrators.passes import has_cryptomatte, has_parts
+from clfractal.integrators.path_state import (
     AOVS,
-    ASKED_LIGHT,
     COUNTERS,
+    CRYPTOMATTE,
+    DIRECT_LIGHT,
     FACE,
     FACET,
     FILM_SAMPLE,
     FLIGHT,
     HALT,
-    LAMP_BEFORE,
+    INTERACTION_SEEN,
+    INTERACTION_THING,
     LAYERS,
     LENS_SAMPLE,
-    MATTES,
+    LIGHT_BEFORE,
     PARTS_OF_LIGHT,
     PATH,
     PIXEL,
     RELIEF,
     SIGHTING,
-    SPOT_SEEN,
-    SPOT_THING,
     START,
     TOUCH,
     WITHIN,
 )
-from clfractal.integrators.passes import has_mattes, has_parts
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.records import bounces
 from clfractal.integrators.waves import (
@@ -72,9 +72,9 @@ def _goes_on(scene: Scene) -> bool:
 
 
 def _tells_things(scene: Scene, plan: Plan) -> bool:
-    """Whether spots know more than how they look."""
+    """Whether interactions know more than how they look."""
     by_quantity = scene.coloring.by not in ("solid", "normal", "iterations")
-    return by_quantity or bool(scene.objects) or has_mattes(plan) or has_faces(scene)
+    return by_quantity or bool(scene.objects) or has_cryptomatte(plan) or has_faces(scene)
 
 
 def normal_count(scene: Scene) -> int:
@@ -93,36 +93,36 @@ PARTS = (
     Part("SUMS", PIXEL.numbers, lambda scene, plan: 1),
     Part("START", START.numbers, lambda scene, plan: int(has_cones(scene, plan))),
     Part("TOUCH", TOUCH.numbers, lambda scene, plan: int(scene.surface.used_points.count > 1)),
-    # The first spot, and the one after the last bounce.
-    Part("SPOT_SEEN", SPOT_SEEN.numbers, lambda scene, plan: 1 + _goes_on(scene)),
+    # The first interaction, and the one after the last bounce.
+    Part("INTERACTION_SEEN", INTERACTION_SEEN.numbers, lambda scene, plan: 1 + _goes_on(scene)),
     Part(
-        "SPOT_THING",
-        SPOT_THING.numbers,
+        "INTERACTION_THING",
+        INTERACTION_THING.numbers,
         lambda scene, plan: (1 + _goes_on(scene)) * _tells_things(scene, plan),
     ),
     Part("FACET", FACET.numbers, lambda scene, plan: normal_count(scene) if normal_count(scene) > 1 else 0),
     Part("PATH", PATH.numbers, lambda scene, plan: int(_goes_on(scene))),
-    Part("ASKED_LIGHT", ASKED_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
+    Part("DIRECT_LIGHT", DIRECT_LIGHT.numbers, lambda scene, plan: int(along_paths(scene))),
     Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
     Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_participating_media(scene))),
     Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
-    # What rays to wide lights have brought, and lights that are before the spot.
+    # What rays to wide lights have brought, and lights that are before the interaction.
     Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),
-    Part("LAMP_BEFORE", LAMP_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),
+    Part("LIGHT_BEFORE", LIGHT_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),
     Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
     Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
-    # What the formula was asked for the present spot's material; and the same around it, with the normal and escape count
-    # there, for the slopes of its material's relief (`kernels/shading/bump_places.h`).
+    # What the formula was asked for the present interaction's material; and the same around it, with the normal and escape
+    # count there, for the slopes of its material's relief (`kernels/shading/bump_places.h`).
     Part("ASKED", 1, lambda scene, plan: len(asked_maps(scene))),
     Part("BESIDE", 1, lambda scene, plan: bump_numbers(scene)),
-    # The present spot's material, where one has to be found.
+    # The present interaction's material, where one has to be found.
     Part("MATTER", matter_numbers(), lambda scene, plan: int(finds_materials(scene))),
     Part("RELIEF", RELIEF.numbers, lambda scene, plan: int(has_bump(scene))),
     Part("FACE", FACE.numbers, lambda scene, plan: int(has_faces(scene))),
     Part("LAYERS", LAYERS.numbers, lambda scene, plan: int(bool(scene.cut_planes))),
     Part("AOVS", AOVS.numbers, lambda scene, plan: int(has_parts(plan))),
     Part("PARTS", PARTS_OF_LIGHT.numbers, lambda scene, plan: int(has_parts(plan))),
-    Part("MATTES", MATTES.numbers, lambda scene, plan: int(has_mattes(plan))),
+    Part("CRYPTOMATTE", CRYPTOMATTE.numbers, lambda scene, plan: int(has_cryptomatte(plan))),
 )
 
 

@@ -14,7 +14,6 @@ from clfractal.geometry.objects import object_defines, object_records
 from clfractal.geometry.planes import CUT_PLANE, plane_palettes, plane_records
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
-from clfractal.integrators.carried import carried_text
 from clfractal.integrators.declarations import struct_text
 from clfractal.integrators.kernel import (
     OBJECT_NUMBERS,
@@ -30,6 +29,7 @@ from clfractal.integrators.kernel import (
 )
 from clfractal.integrators.march import march_record
 from clfractal.integrators.passes import pass_defines
+from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.state import state_numbers, state_places, state_text
 from clfractal.integrators.waves import (
@@ -194,11 +194,11 @@ PROGRAMS = (
         march_defines,
         formula=True,
     ),
-    _Program("begin", "integrators/begin_shots.cl", ("send_cones", "begin_shots"), state_defines),
+    _Program("begin", "integrators/begin_samples.cl", ("send_cones", "begin_samples"), state_defines),
     _Program("points", "integrators/march/pixel_points.cl", ("send_points", "join_points"), state_defines),
-    _Program("spots", "integrators/find_spots.cl", ("find_spots",), state_defines),
+    _Program("interactions", "integrators/find_interactions.cl", ("find_interactions",), state_defines),
     _Program("objects", "geometry/objects.cl", ("meet_objects", "look_at_objects"), state_defines),
-    _Program("light", "integrators/light_spots.cl", ("light_spots",), state_defines),
+    _Program("light", "integrators/light_interactions.cl", ("light_interactions",), state_defines),
     _Program(
         "wide", "integrators/wide_lights.cl", ("send_to_lights", "gather_light", "meet_lights"), state_defines
     ),
@@ -221,7 +221,9 @@ PROGRAMS = (
         state_defines,
         formula=True,
     ),
-    _Program("colors", "integrators/color_spots.cl", ("color_spots",), state_defines, formula=True),
+    _Program(
+        "colors", "integrators/color_interactions.cl", ("color_interactions",), state_defines, formula=True
+    ),
     _Program("glow", "integrators/glow.cl", ("add_glow",), state_defines, formula=True),
     _Program(
         "planes",
@@ -239,7 +241,7 @@ def _structs() -> dict[str, str]:
     """The declarations that stand in every program."""
     return {
         "structs.h": struct_text() + CUT_PLANE.c_text(),
-        "carried.h": carried_text() + state_text(),
+        "path_state.h": path_state_text() + state_text(),
         "pbr.h": pbr_text(),
     }
 

@@ -18,9 +18,9 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.geometry.planes import CUT_PLANE, plane_count, plane_palettes, plane_records, zoom_of
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
-from clfractal.integrators.carried import carried_text
 from clfractal.integrators.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
 from clfractal.integrators.passes import SAMPLING, pass_defines
+from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.given import GivenGrid
@@ -127,7 +127,7 @@ def program_text(scene: Scene, plan: Plan) -> FlatText:
     }
     generated = {
         "structs.h": kind_text() + "".join(struct.c_text() for struct in STRUCTS),
-        "carried.h": carried_text(),
+        "path_state.h": path_state_text(),
     }
     if asks_formula(scene):
         generated |= Body.of(scene).texts(turns=True)

@@ -4,20 +4,21 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
     [send_cones  march]  and for each sample
 
-    begin_shots  march  find_spots (or send_points  march  join_points)  [color_spots]  march  light_spots
+    begin_samples  march  find_interactions (or send_points  march  join_points)  [color_interactions]  march
+    light_interactions
 
-with `[meet_objects]` before each march and `[look_at_objects]` after those that look for a spot, with `[send_to_lights]`
-after the spots and `[meet_lights] [gather_light]` before `light_spots` where direct light comes from more than single
-directions, with `[find_planes]` and `[add_glow]` after `[color_spots]`, and with `[find_faces]` before the march of rays
-that look for a spot; each mirror adds what follows `begin_shots` but for the points.
-With `lighting.mode: path` in the place of the last two
+with `[meet_objects]` before each march and `[look_at_objects]` after those that look for an interaction, with
+`[send_to_lights]` after the interactions and `[meet_lights] [gather_light]` before `light_interactions` where direct
+light comes from more than single directions, with `[find_planes]` and `[add_glow]` after `[color_interactions]`, and
+with `[find_faces]` before the march of rays that look for an interaction; each mirror adds what follows `begin_samples`
+but for the points. With `lighting.mode: path` in the place of the last two
 
     [find_materials]  scatter_paths  march  gather_paths
 
 ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
 those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
 With media that scatter light `cross_media` stands before `scatter_paths` and `end_paths`, and with clouds `pass_clouds`
-after the former. See docs/engineering/shots.md.
+after the former. See docs/engineering/stages.md.
 """
 
 from __future__ import annotations
@@ -94,7 +95,9 @@ def has_media(scene: Scene) -> bool:
 
 
 def finds_materials(scene: Scene) -> bool:
-    """Whether materials of spots differ from place to place, or parts of several are mixed: else each thing has its own."""
+    """Whether materials of interactions differ from place to place, or parts of several are mixed: else each thing has
+    its own.
+    """
     if not isinstance(scene.lighting, PathLighting):
         return False
     return bool(MappedMaterials(scene).maps) or has_faces(scene) or joins_smoothly(scene)
@@ -106,7 +109,7 @@ def met_numbers(scene: Scene) -> int:
 
 
 def light_turns(scene: Scene) -> int:
-    """Rays that leave a spot for its light; along paths they are sent by a stage of their own."""
+    """Rays that leave an interaction for its light; along paths they are sent by a stage of their own."""
     if isinstance(scene.lighting, PathLighting):
         return 0
     rays = hemisphere_rays(scene)
@@ -130,7 +133,7 @@ def has_wide_lights(scene: Scene) -> bool:
 
 
 def air_turns(scene: Scene) -> int:
-    """Rays that leave the fog before the first spot: one to each light."""
+    """Rays that leave the fog before the first interaction: one to each light."""
     fog = scene.fog
     return (
         len(single_lights(scene)) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
@@ -214,7 +217,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     def of_objects(kernels: tuple[str, ...], turns: int) -> Iterator[Stage]:
         return (Stage(kernel, OVER[kernel], turns) for kernel in kernels)
 
-    yield stage("begin_shots", int(cones))
+    yield stage("begin_samples", int(cones))
     for bounce in range(bounces(scene) + 1):
         turns = 1
         within = bounce > 0 and has_glass_set(scene)
@@ -234,7 +237,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             if within:
                 yield from _marched(inside_kernels(scene, plan), 1, GOAL_SURFACE, bounce)
         yield from of_objects(looked, turns + within)
-        kernel = "join_points" if points > 1 and bounce == 0 else "find_spots"
+        kernel = "join_points" if points > 1 and bounce == 0 else "find_interactions"
         yield stage(kernel, turns, bounce=bounce, next_turns=after)
         if has_wide_lights(scene):
             yield stage("send_to_lights", bounce=bounce, next_turns=after)
@@ -242,7 +245,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         if air > 0:  # behind the rays for light
             yield stage("send_air", next_turns=1 if paths else after)
         if asks_formula(scene):
-            yield stage("color_spots", bounce=bounce)
+            yield stage("color_interactions", bounce=bounce)
         if scene.cut_planes and bounce == 0 and not paths:
             yield stage("find_planes")
         if scene.glow is not None:
@@ -272,7 +275,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield stage("meet_lights", bounce=bounce)
         if has_wide_lights(scene):
             yield stage("gather_light", after + air, bounce=bounce)
-        yield stage("light_spots", after + air, bounce=bounce)
+        yield stage("light_interactions", after + air, bounce=bounce)
     if isinstance(scene.lighting, PathLighting):
         yield from of_objects(met, 1)
         yield from _marched(marching, 1, GOAL_SHADOW)

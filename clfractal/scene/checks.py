@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING
 
 from clfractal.errors import SceneError, Where
 from clfractal.files.channels import (
+    CRYPTOMATTE_MATERIALS,
+    CRYPTOMATTE_OBJECTS,
+    ID_CHANNELS,
     LIGHT_LAYERS,
-    MATERIAL_MATTES,
-    MATTES,
     NOISY,
-    OBJECT_MATTES,
     SURFACE_LAYERS,
 )
 from clfractal.scene.cut_plane import CutPlaneRenderer
@@ -69,14 +69,14 @@ def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
             raise SceneError(f"{name} is what was denoised; it needs output.denoise: true", Where(path=where))
         if name in NOISY and not {"R", "G", "B"} <= set(names):
             raise SceneError(f"{name} is what was denoised; it needs the channels R, G, B", Where(path=where))
-        if name in {*SURFACE_LAYERS, *MATTES} and not surface:
+        if name in {*SURFACE_LAYERS, *ID_CHANNELS} and not surface:
             raise SceneError(
                 f"{name} is known of surfaces only, not with renderer.type {scene.renderer.type}",
                 Where(path=where),
             )
         if name in LIGHT_LAYERS and not isinstance(scene.lighting, PathLighting):
             raise SceneError(f"{name} needs lighting: {{mode: path}}", Where(path=where))
-    for layer, parts in (("CryptoObject", OBJECT_MATTES), ("CryptoMaterial", MATERIAL_MATTES)):
+    for layer, parts in (("CryptoObject", CRYPTOMATTE_OBJECTS), ("CryptoMaterial", CRYPTOMATTE_MATERIALS)):
         if 0 < len(set(parts) & set(names)) < len(parts):
             raise SceneError(
                 f"{layer} is one thing: name {layer}, which brings all of its channels", Where(path=where)

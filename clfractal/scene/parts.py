@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self, TypeAlias
 
 from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validator
 
-from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, LAYERS, MATTES, unknown_channel
+from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, ID_CHANNELS, LAYERS, unknown_channel
 from clfractal.files.tone_names import Tone
 from clfractal.scene.camera_base import CameraBase
 from clfractal.schema.base import (
@@ -259,7 +259,7 @@ class Output(Section):
             if channel in self.channels[:index]:
                 raise problem(f"channel {channel!r} is given twice", f"channels.{index}")
         for name, stored in self.precision.items():
-            if name in MATTES and stored == "half":
+            if name in ID_CHANNELS and stored == "half":
                 raise problem("must be float: numbers of things are exact", f"precision.{name}")
         return self
 

@@ -1,4 +1,4 @@
-"""Objects that shine, which paths ask for as they ask for lights (`kernels/shading/emitters.h`)."""
+"""Objects that shine, which paths sample as they sample lights (`kernels/shading/emitters.h`)."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from clfractal.shading.maps import glass_bodies
 from clfractal.shading.materials import used_materials
 
 
-def asked_radiance(scene: Scene) -> list[Vector | None]:
-    """Of each object the radiance, linear Rec. 709, with which paths ask for it; None where they do not.
+def sampled_radiance(scene: Scene) -> list[Vector | None]:
+    """Of each object the radiance, linear Rec. 709, with which paths sample it; None where they do not.
 
-    Solids that stand beside the set are asked for where they shine the same everywhere. What differs from place to
+    Solids that stand beside the set are sampled where they shine the same everywhere. What differs from place to
     place, blends, glass, which shines inside too, what planes cut, and what is joined to the set are found by chance alone.
     """
     if not isinstance(scene.lighting, PathLighting):

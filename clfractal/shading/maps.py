@@ -46,7 +46,7 @@ MAP_DEFINES = {
     "MOST_MATERIALS": MAX_MATERIALS + 1,
 }
 BUMP_PLACES = 3
-"""Places around a spot where heights are compared."""
+"""Places around an interaction where heights are compared."""
 TABLE = 256
 """Colours of a table, as of a palette."""
 
@@ -108,12 +108,12 @@ class MappedMaterials:
 
     @property
     def relief_asked(self) -> int:
-        """How many of `asked`, from the first on, are asked around spots too."""
+        """How many of `asked`, from the first on, are asked around interactions too."""
         return len({_question(each) for each in self.relief if each.by in ASKED})
 
     @property
     def relief_of_surface(self) -> bool:
-        """Whether heights follow what the surface itself is around spots: its normals and escape counts."""
+        """Whether heights follow what the surface itself is around interactions: its normals and escape counts."""
         return any(each.by in ("iterations", "normal") for each in self.relief)
 
     def _width(self, number: int) -> float:
@@ -292,7 +292,7 @@ def asked_maps(scene: Scene) -> list[Map]:
 
 
 def bump_numbers(scene: Scene) -> int:
-    """Numbers of a pixel that are kept of the places around its spot; see `bump_places.h`."""
+    """Numbers of a pixel that are kept of the places around its interaction; see `bump_places.h`."""
     if not isinstance(scene.lighting, PathLighting):
         return 0
     found = MappedMaterials(scene)

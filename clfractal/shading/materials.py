@@ -100,7 +100,7 @@ def pbr_text() -> str:
     """The type of a lane's material, and how one begins as a record: the same everywhere (`bsdf.h`)."""
     kinds = {0: "real", 3: "color"}
     lines = [
-        "// The parameters of a material at a spot, which may differ from lane to lane.",
+        "// The parameters of a material at an interaction, which may differ from lane to lane.",
         "typedef struct {",
     ]
     lines += [f"    {kinds[field.count]} {field.name};" for field in PARAMETERS]

@@ -1,6 +1,6 @@
-"""Lights on the set as kernels read them: balls, by which of them to ask from where, and what a ray meets.
+"""Lights on the set as kernels read them: balls, by which of them to sample from where, and what a ray meets.
 
-All of them stand in a cube. A coarse grid of it has in each cell the probabilities with which a place there asks for each
+All of them stand in a cube. A coarse grid of it has in each cell the probabilities with which a place there samples each
 ball, as running sums: by brightness, distance, and the side to which the ball shines (as the bounds of Conty Estevez
 and Kulla 2018, Importance Sampling of Many Lights with Adaptive Tree Splitting). A finer grid lists the balls in each of
 its cells.

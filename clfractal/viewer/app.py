@@ -24,8 +24,8 @@ from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.panels import all_panels, timeline_area
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.room import Room
+from clfractal.viewer.screenshots import Drawn
 from clfractal.viewer.settings import Settings
-from clfractal.viewer.shots import Drawn
 from clfractal.viewer.ui_renderer import UiRenderer
 from clfractal.viewer.window_places import places_of
 from clfractal.viewer.workspace import Workspace

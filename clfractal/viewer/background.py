@@ -13,7 +13,7 @@ import numpy.typing as npt
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.finish import save_job
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.preview import Preview
@@ -21,7 +21,7 @@ from clfractal.engine.run import Progress, run
 from clfractal.engine.settle import settled
 from clfractal.errors import ClfractalError, Stopped
 from clfractal.images.develop import rgb8
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from clfractal.viewer.fitting import Cancellable, measured_exposure, with_exposure
 from clfractal.viewer.preparing import internal_error
@@ -108,9 +108,9 @@ class Thumbnail:
     def __init__(self, load: Callable[[], Scene], size: tuple[int, int], samples: int = 1) -> None:
         self._load, self.size, self.samples = load, size, samples
         self.pixels: Pixels | None = None
-        self.film: Film | None = None
+        self.framebuffer: Framebuffer | None = None
         self.problem = ""
-        self._films: JobFilms | None = None
+        self._framebuffers: JobFramebuffers | None = None
         self._token: CancelToken | None = None
         self._cancelled = False
 
@@ -134,15 +134,15 @@ class Thumbnail:
         self._token = token
         if self._cancelled:
             return
-        if self._films is None or self._films.job.device != executor.device.info:
-            self._films = JobFilms(prepared(self._scene(), executor, token, tell, colors=True))
-        run(self._films.job, self._films.films, executor, token=token)
-        film = self._films.picture()
+        if self._framebuffers is None or self._framebuffers.job.device != executor.device.info:
+            self._framebuffers = JobFramebuffers(prepared(self._scene(), executor, token, tell, colors=True))
+        run(self._framebuffers.job, self._framebuffers.framebuffers, executor, token=token)
+        framebuffer = self._framebuffers.picture()
         self._token = None
-        colors = rgb8(film, self._films.development)
+        colors = rgb8(framebuffer, self._framebuffers.development)
         opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
-        self.film = film
-        self._films = None
+        self.framebuffer = framebuffer
+        self._framebuffers = None
         self.pixels = np.concatenate([colors, opaque], axis=-1)
 
     def _scene(self) -> Scene:
@@ -177,7 +177,7 @@ class Still:
         self.written: tuple[Path, ...] = ()
         self.remaining: float | None = None
         self._header = header or {}
-        self._films: JobFilms | None = None
+        self._framebuffers: JobFramebuffers | None = None
         self._token: CancelToken | None = None
         self._writing = False
         self._writer: threading.Thread | None = None
@@ -212,17 +212,17 @@ class Still:
         self._token = token
         if self.cancelled:
             return
-        if self._films is None or self._films.job.device != executor.device.info:
-            self._films = JobFilms(
+        if self._framebuffers is None or self._framebuffers.job.device != executor.device.info:
+            self._framebuffers = JobFramebuffers(
                 prepared(self.scene, executor, token, tell, colors=False, exposed_in=self._exposed_in)
             )
-        films = self._films
-        run(films.job, films.films, executor, token=token, progress=self._told)
-        self._films = self._token = None
+        framebuffers = self._framebuffers
+        run(framebuffers.job, framebuffers.framebuffers, executor, token=token, progress=self._told)
+        self._framebuffers = self._token = None
         self._writing = True
         # The device is free for the next picture meanwhile.
         self._writer = threading.Thread(
-            target=self._write, args=(films,), name="clfractal-still", daemon=True
+            target=self._write, args=(framebuffers,), name="clfractal-still", daemon=True
         )
         self._writer.start()
 
@@ -230,9 +230,14 @@ class Still:
         """See `Task`."""
         self.problem = str(error)
 
-    def _write(self, films: JobFilms) -> None:
+    def _write(self, framebuffers: JobFramebuffers) -> None:
         try:
-            save_job(films.job, films.films, self.paths, {**films.job.header(), **self._header})
+            save_job(
+                framebuffers.job,
+                framebuffers.framebuffers,
+                self.paths,
+                {**framebuffers.job.header(), **self._header},
+            )
             self.written = self.paths
         except ClfractalError as error:
             self.failed(error)

@@ -15,7 +15,7 @@ from clfractal.scene.model import Scene
 from clfractal.viewer.autosave import Autosave, Recovered
 from clfractal.viewer.reloading import Reloading, loaded_again
 from clfractal.viewer.saving import save_scene, scene_text
-from clfractal.viewer.shots import Drawn, Shots, free_name
+from clfractal.viewer.screenshots import Drawn, Screenshots, free_name
 from clfractal.viewer.sources import SceneSource, is_protected, open_source, suggested_name
 from clfractal.viewer.window_options import Options
 
@@ -54,7 +54,7 @@ class Files:
         self._kept: Scene | None = None
         self._overrides, self._stereo = tuple(options.overrides), options.stereo
         self._reloading = Reloading(self._again)
-        self._shots = Shots(options.shot)
+        self._screenshots = Screenshots(options.shot)
         for path, kinds in ((options.shot, (".png",)), (options.save, (".yaml", ".yml"))):
             if path is not None:
                 check_output(path, kinds)
@@ -68,7 +68,7 @@ class Files:
     @property
     def finished(self) -> bool:
         """Whether the window is to close."""
-        return self._left or self._shots.finished
+        return self._left or self._screenshots.finished
 
     # Opening
 
@@ -223,7 +223,7 @@ class Files:
 
     def screenshot(self, *, panels: bool = False) -> None:
         """The next frame goes to a PNG beside the scene, alone or with the panels over it."""
-        self._shots.take(self.source, panels=panels)
+        self._screenshots.take(self.source, panels=panels)
 
     def export(self) -> None:
         """The picture with all channels, at the window's size, as EXR beside the scene."""
@@ -273,7 +273,7 @@ class Files:
 
     def after_draw(self, drawn: Drawn) -> bool:
         """Takes screenshots of what was drawn and not yet shown; whether one waits for another frame."""
-        return self._shots.after_draw(drawn, self.studio)
+        return self._screenshots.after_draw(drawn, self.studio)
 
     def keep(self) -> None:
         """The window ends without being closed: what is unsaved is offered at the next start."""

@@ -105,8 +105,8 @@ class Painter:
         numbers = range(len(job.views)) if numbers is None else numbers
         stores = [CanvasStore(canvas, view, number) for view, number in zip(job.views, numbers, strict=True)]
         writer = self._writer
-        self.executor.outlet = lambda view, film, places, tiles: writer.place(
-            canvas, numbers[view], job.views[view].plan.region, film, places, tiles
+        self.executor.outlet = lambda view, framebuffer, places, tiles: writer.place(
+            canvas, numbers[view], job.views[view].plan.region, framebuffer, places, tiles
         )
         state = run(job, stores, self.executor, token=token, samples=samples, progress=grown)
         with self.device.failures("rendering"):

@@ -9,13 +9,13 @@ import numpy as np
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.canvas import Canvas
 from clfractal.engine.finish import darkness_is_certain
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
 from clfractal.files.channels import ALBEDO, NORMAL
 from clfractal.images.denoise import check_installed, denoised
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiled import Floats
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
@@ -54,7 +54,7 @@ def clean(
 
 def _guides(
     scene: Scene, canvas: Canvas, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]
-) -> list[Film | None]:
+) -> list[Framebuffer | None]:
     """What each part of the canvas shows of surfaces; None where only colours are known."""
     plain = scene.model_copy(update={"output": scene.output.model_copy(update={"denoise": False})})
     if not all(isinstance(each.renderer, SurfaceRenderer) for each in _shown(scene)):
@@ -66,15 +66,15 @@ def _guides(
         samples=min(GUIDE_SAMPLES, scene.renderer.samples),
         on_start=tell,
     )
-    films = JobFilms(job)
-    run(job, films.films, executor, token=token)
+    framebuffers = JobFramebuffers(job)
+    run(job, framebuffers.framebuffers, executor, token=token)
     token.check()
-    return [*films.films]
+    return [*framebuffers.framebuffers]
 
 
 def _shown(scene: Scene) -> list[Scene]:
     return [view for view, _ in scene.views] if scene.layout is not None else [scene]
 
 
-def _stacked(film: Film, names: tuple[str, ...]) -> Floats:
-    return np.stack([film[name] for name in names], axis=-1)
+def _stacked(framebuffer: Framebuffer, names: tuple[str, ...]) -> Floats:
+    return np.stack([framebuffer[name] for name in names], axis=-1)

@@ -112,7 +112,7 @@ CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mas
 
 // The numbers of a path's ray: where it is scattered on it, what comes through to a light, what shines on it.
 #define CLOUD_MEETS 0x40000000u
-#define CLOUD_ASKS 0x80000000u
+#define CLOUD_SHADOW_RAY 0x80000000u
 #define CLOUD_SHINES 0xc0000000u
 INLINE stream cloud_stream(stage s, const packet_pixels *at, uint purpose, world w) {
     return stream_of(at, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce + purpose, s.sample);
@@ -130,10 +130,10 @@ INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_
     return found;
 }
 
-// What comes through to a light that was asked for, if its ray has a length.
-INLINE real light_passes_clouds(stage s, const packet_pixels *at, ray asks, mask here, world w) {
-    const stream numbers = cloud_stream(s, at, CLOUD_ASKS, w);
-    return clouds_passed(&asks.origin, &asks.direction, asks.far, here & less(R(0.0), asks.far), &numbers, w);
+// What comes through to a light that was sampled, if its ray has a length.
+INLINE real light_passes_clouds(stage s, const packet_pixels *at, ray shadow_ray, mask here, world w) {
+    const stream numbers = cloud_stream(s, at, CLOUD_SHADOW_RAY, w);
+    return clouds_passed(&shadow_ray.origin, &shadow_ray.direction, shadow_ray.far, here & less(R(0.0), shadow_ray.far), &numbers, w);
 }
 
 // Brings paths to where clouds have met them.

@@ -1,8 +1,8 @@
-// Cut planes in the picture of an object, at the end of a shot.
+// Cut planes in the picture of an object, at the end of a sample.
 #include "geometry/plane_cuts.h"
 
-// Puts the planes into a shot whose radiance is still that of the object alone, not over any background.
-INLINE shot planes_into(shot s, color object, color background, plane_layers layers, real time, view_record view) {
+// Puts the planes into a sample whose radiance is still that of the object alone, not over any background.
+INLINE pixel_sample planes_into(pixel_sample s, color object, color background, plane_layers layers, real time, view_record view) {
     const color far = color_add(layers.behind, color_scale(background, layers.behind_through));
     const color middle = color_mix(far, object, s.coverage);
     s.radiance = color_add(layers.front, color_scale(middle, layers.front_through));

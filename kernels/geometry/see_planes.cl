@@ -13,7 +13,7 @@ INLINE mask cut_objects_hold(int plane, vec point, plane_set set) {
     return held;
 }
 
-// Finds where a plane opens the set on the ray that was sent for the next spot: there its face is met, and no ray goes on. (Of objects
+// Finds where a plane opens the set on the ray that was sent for the next interaction: there its face is met, and no ray goes on. (Of objects
 // beside the set stages know that by themselves, see `surface_met`.)
 STAGE(find_faces) {
     STAGE_BEGINS(s, w);
@@ -31,12 +31,12 @@ STAGE(find_faces) {
     lanes_store(pick(bare, R(-1.0), lanes_load(far)), far);
 }
 
-// Finds the planes in front of and behind the first spots. Along paths faces have light, and quads have none: there a face hides the
+// Finds the planes in front of and behind the first interactions. Along paths faces have light, and quads have none: there a face hides the
 // part of its own quad that is at the same place.
 STAGE(find_planes) {
     STAGE_BEGINS(s, w);
     const camera_sample a = camera_sample_kept(s);
-    const spot found = spot_kept(s, 0);
+    const interaction found = interaction_kept(s, 0);
     const ray r = eye_ray(&a, view);
     const real way = vec_dot(vec_sub(found.seen, r.origin), r.direction);
     const real object = pick(mask_of(found.found), way, (real)(REAL_LARGEST));

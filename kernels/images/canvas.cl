@@ -4,15 +4,15 @@
 
 #define TILE_PIXELS (TILE * TILE)
 
-// Copies finished tiles of one launch. Film: [tile][R, G, B, A, Z][row][column]. `left` and `top` are the first pixel that the
+// Copies finished tiles of one launch. Framebuffer: [tile][R, G, B, A, Z][row][column]. `left` and `top` are the first pixel that the
 // canvas holds, `clip` (left, top, right, bottom) is what was rendered. One work-item takes one row of a tile.
-__kernel void place_tiles(__global const float *film, __global const int4 *places, __global float4 *colors,
+__kernel void place_tiles(__global const float *framebuffer, __global const int4 *places, __global float4 *colors,
                           __global float *depths, int offset, int left, int top, int width, int clip_left, int clip_top, int clip_right,
                           int clip_bottom) {
     const int row = (int)get_global_id(0), tile = (int)get_global_id(1);
     const int x = places[tile].x, y = places[tile].y + row;
     if (y < clip_top || y >= clip_bottom) return;
-    __global const float *from = film + (size_t)tile * CHANNELS * TILE_PIXELS + row * TILE;
+    __global const float *from = framebuffer + (size_t)tile * CHANNELS * TILE_PIXELS + row * TILE;
     const long to = offset + (long)(y - top) * width + x - left;
     const int first = x < clip_left ? clip_left - x : 0, end = clip_right - x < TILE ? clip_right - x : TILE;
     for (int column = first; column < end; ++column) {

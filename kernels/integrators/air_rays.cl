@@ -1,8 +1,8 @@
-// Entry points: light that fog scatters to the eye, before the first spot. They know no formula.
+// Entry points: light that fog scatters to the eye, before the first interaction. They know no formula.
 #include "integrators/stages.h"
 #include "shading/environment.h"
 #include "shading/phase.h"
-#include "integrators/spot.h"
+#include "integrators/interaction.h"
 #include "shading/set_lights.h"
 #include "shading/light_places.h"
 #include "integrators/secondary.h"
@@ -13,24 +13,24 @@
 STAGE(send_air) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const spot found = spot_kept(s, 0);
+    const interaction found = interaction_kept(s, 0);
     const camera_sample a = camera_sample_kept(s);
     const ray r = eye_ray(&a, w.view);
     const real far = way_in_fog(s, r, &found, w);
     for (int i = 0; i < w.settings->light_count; ++i) {
         const scattering from = scattered(s, &here.at, r, far, i, w);
-        const ray asks = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
+        const ray shadow_ray = {vec_along(r.origin, from.t, r.direction), from.in.toward, R(0.0), from.in.distance,
                           (r.footprint + r.spread * from.t) * (real)(w.settings->shadow_detail), R(0.0), RAY_NOTHING_KNOWN};
         const mask wanted = mask_of(a.wanted) & less(from.t, R(1e15)) & (w.lights[i].shadow ? ~0 : 0);
-        send_clipped(s, next_turns + i, asks, R(0.0), WHETHER, wanted, w);
+        send_clipped(s, next_turns + i, shadow_ray, R(0.0), WHETHER, wanted, w);
     }
 }
 
-// Keeps what these rays bring to the end of the shot.
+// Keeps what these rays bring to the end of the sample.
 STAGE(gather_air) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    const spot found = spot_kept(s, 0);
+    const interaction found = interaction_kept(s, 0);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const camera_sample a = camera_sample_kept(s);
     const ray r = eye_ray(&a, w.view);

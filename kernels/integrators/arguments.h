@@ -3,12 +3,12 @@
 // The first and the last arguments of a renderer's kernel; its own stand between them. OpenCL 1.2 guarantees eight `__constant` ones:
 // lists are `__global`, and constant what all work-items read at the same time.
 #define PASS_BUFFERS                                                                                                       \
-    __global float *film, __global scalar *kept, __global uint *statistics, __global const int4 *places,                   \
+    __global float *framebuffer, __global scalar *kept, __global uint *statistics, __global const int4 *places,                   \
         __constant const struct View *view, __constant const struct Sampling *sampling
 #define PASS_SPAN                                                                                                          \
     __global const int *slots, int channel_count, int kept_count, int first_packet, int end_packet, int first, int end, \
         int mode
-#define PASS {film, kept, statistics, places, view, sampling, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode}
+#define PASS {framebuffer, kept, statistics, places, view, sampling, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode}
 
 // What every stage of a surface's picture is given: one list, so that the host sets it once.
 #define STAGE_ARGUMENTS                                                                                                    \
@@ -23,7 +23,7 @@
 // The head of a stage's kernel, whose work-item is number ITEM along the first dimension and ROW along the second.
 #ifdef DIRECT_BUILT_INS
 #define STAGE_GIVEN                                                                                                         \
-    film, kept, statistics, places, view, sampling, settings, orbit, k, material, lights, palette, environment, planes,     \
+    framebuffer, kept, statistics, places, view, sampling, settings, orbit, k, material, lights, palette, environment, planes,     \
         plane_palettes, materials, albedos, maps, tables, set_lights, objects, state, rays, met, slots, channel_count, kept_count, first_packet, end_packet, first, end, mode,     \
         first_tile, wave, queue_stride, turns, slice, next_turns, goal, bounce, sample
 #define STAGE(name)                                                                                                        \

@@ -1,4 +1,4 @@
-// A shot of a cut plane: what it reads, and what it finds.
+// A sample of a cut plane: what it reads, and what it finds.
 #include "formulas/orbits.h"
 #include "integrators/view.h"
 #include "integrators/sampling.h"
@@ -17,7 +17,7 @@ typedef struct {
     __global const float *palette;
 } world;
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
+INLINE pixel_sample take_sample(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     const real from_center_x = at->x - (real)(w.view->center_x), from_center_y = at->y - (real)(w.view->center_y);
     real time = R(0.0);
     if (w.view->spans > 0) time = shutter_time(at->columns, at->rows, (uint)w.sampling->seed, sample);
@@ -26,6 +26,6 @@ INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sa
     const escaped e = plane_escape(point, active, w.plane->smooth, w.plane->periodicity, w.plane->iterations, w.orbit, w.k);
     cost->steps += pick(active, R(1.0), R(0.0));
     cost->count += pick(active, e.applications, R(0.0));
-    return (shot){.radiance = escape_color(e, w.plane, w.palette), .hit = active, .coverage = R(1.0), .depth = R(0.0), .point = point,
+    return (pixel_sample){.radiance = escape_color(e, w.plane, w.palette), .hit = active, .coverage = R(1.0), .depth = R(0.0), .point = point,
                   .normal = vec_scale(VIEW_VEC(w.view, axis, time), R(-1.0)), .smooth = e.count, .steps = e.applications};
 }

@@ -15,7 +15,7 @@ typedef struct {
 } event;
 
 // Puts an event where a path has landed, with the normals of the surface and of its side that the path is on; or `in_medium`, where it is.
-INLINE void event_placed(event *e, vec origin, const spot *here, vec normal, vec outward, mask in_medium, world w) {
+INLINE void event_placed(event *e, vec origin, const interaction *here, vec normal, vec outward, mask in_medium, world w) {
     const real nowhere = R(0.0);
     e->in_medium = in_medium;
     e->point = vec_pick(in_medium, origin, here->point);

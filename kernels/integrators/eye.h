@@ -21,7 +21,7 @@ INLINE real object_material(real object, world w) {
     return number;
 }
 
-INLINE real spot_material(const spot *here, world w) { return object_material(here->object, w); }
+INLINE real interaction_material(const interaction *here, world w) { return object_material(here->object, w); }
 
 // The sums of the packet's pixels before this sample.
 INLINE pixel sums_before(stage s, const place_in_pass *here) {
@@ -67,7 +67,7 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask 
     send_to_set(s, turn, r, free, wanted, w);
 }
 
-// The ray that finds the next spot: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
+// The ray that finds the next interaction: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
 INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     so_far->on_path = wanted;
     so_far->through = color_of(R(1.0), R(1.0), R(1.0));
@@ -81,14 +81,14 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     return r;
 }
 
-// Whether all paths of a packet ended at an earlier spot, and no light that they asked for is awaited: nothing is left to do for them.
+// Whether all paths of a packet ended at an earlier interaction, and no light that they sampled is awaited: nothing is left to do for them.
 // (What is kept says so from the second bounce on, and rays that are not sent stay so.)
 INLINE int paths_are_over(stage s) {
     if (s.bounce < 2) return 0;
     // Of whole structs too much would be read.
     path so_far;
     const int on_path = s.at[STATE_PATH] + (int)(&so_far.on_path - (real *)&so_far);
-    const int found = s.at[STATE_SPOT_SEEN] + SPOT_SEEN_NUMBERS, awaited = s.at[STATE_ASKED_LIGHT];
+    const int found = s.at[STATE_INTERACTION_SEEN] + INTERACTION_SEEN_NUMBERS, awaited = s.at[STATE_DIRECT_LIGHT];
     const int numbers[5] = {on_path, found, awaited, awaited + 1, awaited + 2};
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));

@@ -1,6 +1,6 @@
-// Entry point: the materials of spots, where a scene has several, or one that differs from place to place. It knows no formula.
+// Entry point: the materials of interactions, where a scene has several, or one that differs from place to place. It knows no formula.
 #include "integrators/stages.h"
-#include "integrators/spot.h"
+#include "integrators/interaction.h"
 #include "shading/phase.h"
 #include "shading/flights.h"
 #include "shading/media.h"
@@ -10,18 +10,18 @@
 #include "shading/material_at.h"
 #include "shading/bump.h"
 
-// Keeps the numbers of a path's present spot, and the slope of its relief.
+// Keeps the numbers of a path's present interaction, and the slope of its relief.
 STAGE(find_materials) {
     STAGE_BEGINS(s, w);
     if (paths_are_over(s)) return;
-    spot here = spot_kept(s, bounce);
+    interaction here = interaction_kept(s, bounce);
     if (!any_lane(mask_of(here.found))) return;
     const camera_sample a = camera_sample_kept(s);
     path so_far;
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
     mask emerges = less(R(1.0), R(0.0));
     if (HAS(w, SUBSURFACE)) {
-        const carried with = carried_kept(s);
+        const path_state with = path_state_kept(s);
         emerges = path_emerges(bounce, &with, &here, w);
     }
     here.normal = vec_pick(emerges, here.normal, facing(here.normal, direction));

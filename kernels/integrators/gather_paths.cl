@@ -4,16 +4,16 @@
 #define SOUGHT_BEYOND R(4.0)   // footprints
 
 // How far a ray is marched for a flight: a surface just before its end is found some footprints beyond it.
-INLINE real flight_sought(const path *so_far, const carried *with, world w) {
+INLINE real flight_sought(const path *so_far, const path_state *with, world w) {
     const real cone = (real)(w.settings->detail) * (so_far->footprint + so_far->spread * with->flight);
     return fmin(with->flight + SOUGHT_BEYOND * cone, (real)(REAL_LARGEST));
 }
 
-// Adds the light that was asked for, where nothing is in its way, and sends the next ray of the path.
+// Adds the light that was sampled, where nothing is in its way, and sends the next ray of the path.
 STAGE(gather_paths) {
     PATH_STAGE_BEGINS(s, w);
     STATE_KEPT(s, path, so_far, STATE_PATH);
-    carried with = carried_kept(s);
+    path_state with = path_state_kept(s);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     const ray_hit answer = queue_met(s.q, 0, s.slot);
     counters_met(&cost, answer, 0);
@@ -29,25 +29,25 @@ STAGE(gather_paths) {
     send_clipped(s, 0, r, R(0.0), WHICH, on_path & ~within, w);
 }
 
-// Ends the shots. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
+// Ends the samples. The last ray of a path only finds out whether it leaves the set: else light that both ways could have found would
 // have a part of its weight.
 STAGE(end_paths) {
     STAGE_BEGINS(s, w);
     const camera_sample a = camera_sample_kept(s);
     STATE_KEPT(s, path, so_far, STATE_PATH);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
-    carried with = carried_kept(s);
+    path_state with = path_state_kept(s);
     const ray_hit last = queue_met(s.q, 0, s.slot);
     counters_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
     if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
     real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
-    lamp before = lamp_met(so_far.origin, so_far.direction, 0, &far, w);
+    light_hit before = light_hit_of(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
     if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, on_path, w);
     path_ends(s, &so_far, &with, &before, on_path & ~mask_of(last.hit), a.y, w);
     if (HAS(w, EMITTERS)) path_ends_at_emitter(s, &so_far, &with, last, on_path & ~before.met, w);
     if (bounce == 1 && KEEPS(s, STATE_AOVS)) aovs_once(s, so_far.seen);
-    const spot first_spot = spot_kept(s, 0);
-    end_shots(s, a, so_far.seen, &first_spot, cost, w);
+    const interaction first_interaction = interaction_kept(s, 0);
+    end_samples(s, a, so_far.seen, &first_interaction, cost, w);
 }

@@ -16,7 +16,7 @@ INLINE color spectrum_at(real place, real *bend, __global const float *table) {
 // The material as a path meets it, from inside or not: for glass that spreads colours, at the path's wavelength, or at one that it
 // takes if it is refracted now, `wave` in (0, 1), which then is the path's; the result is what it weighs then. The index by Cauchy's
 // equation n = a + b / wavelength^2, and over that of the glass around.
-INLINE color glass_met(const carried *with, border edge, pbr *p, real *wave, world w) {
+INLINE color glass_met(const path_state *with, border edge, pbr *p, real *wave, world w) {
     const color white = color_of(R(1.0), R(1.0), R(1.0));
     p->inside = number_of(edge.leaving);
     const mask spreads = less(R(0.0), p->transmission_weight * p->transmission_dispersion_scale) & ~edge.hidden;
@@ -44,14 +44,14 @@ INLINE color glass_met(const carried *with, border edge, pbr *p, real *wave, wor
     return weights;
 }
 
-// Whether a direction leads from a spot to the outer side of its body.
+// Whether a direction leads from an interaction to the outer side of its body.
 INLINE mask leads_out(vec toward, vec normal, mask leaving) {
     const mask over = less(R(0.0), vec_dot(toward, normal));
     return (over & ~leaving) | (~over & leaving);
 }
 
-// Lets the glass on the outer side of a boundary absorb the light that was asked for there.
-INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
+// Lets the glass on the outer side of a boundary absorb the light that was sampled there.
+INLINE void awaited_absorbed(path_state *with, border edge, real way, world w) {
     const mask through_glass = less(R(0.0), pick(edge.leaving, edge.around, with->medium));
     if (!any_lane(through_glass)) return;
     const color around = color_pick(edge.leaving, medium_of(edge.around, w).extinction, with->extinction);
@@ -60,7 +60,7 @@ INLINE void awaited_absorbed(carried *with, border edge, real way, world w) {
 }
 
 // Brings paths that are at a boundary over it if their direction leads there.
-INLINE void path_crosses(path *so_far, carried *with, const spot *here, border edge, const pbr *p, mask sinks, color weights, real wave,
+INLINE void path_crosses(path *so_far, path_state *with, const interaction *here, border edge, const pbr *p, mask sinks, color weights, real wave,
                          mask lands, world w) {
     const mask over = ~lands | less(R(0.0), vec_dot(so_far->direction, here->normal)), crosses = ~over;
     const mask stays_out = leads_out(so_far->direction, here->normal, edge.leaving);
@@ -79,7 +79,7 @@ INLINE void path_crosses(path *so_far, carried *with, const spot *here, border e
     const real lift = lift_of(here, w) * pick(over, R(1.0), R(-1.0));
     origin = vec_pick(of_set, origin, vec_along(here->point, lift, here->normal));
     so_far->origin = vec_pick(~lands | (stays_out & of_set), so_far->origin, origin);
-    // Nobody asks for light that reaches a spot through its own body.
+    // Nobody samples light that reaches an interaction through its own body.
     with->density = pick(~lands | (stays_out & ~edge.hidden), with->density, R(-1.0));
     media_leave(with, edge.body, crosses & edge.leaving);
     media_enter(with, body, crosses & ~edge.leaving);

@@ -42,12 +42,12 @@ INLINE real glow_along(ray r, mask active, bits seed, counters *cost, world w, o
     return sum / width;
 }
 
-// Keeps what the eye's ray sees to the end of the shot; what others see is light of their paths.
+// Keeps what the eye's ray sees to the end of the sample; what others see is light of their paths.
 STAGE(add_glow) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const camera_sample a = camera_sample_kept(s);
-    const spot found = spot_kept(s, bounce);
+    const interaction found = interaction_kept(s, bounce);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const mask wanted = mask_of(bounce == 0 ? a.wanted : so_far.on_path);

@@ -1,8 +1,8 @@
-// Light that a spot sends along a path, and what a path has seen at its end.
+// Light that an interaction sends along a path, and what a path has seen at its end.
 
-// The light that one light ray adds, for every normal of the spot.
-INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open, vec to_viewer,
-                    light_record light, look l, world w) {
+// The light that one light ray adds, for every normal of the interaction.
+INLINE color lit_by(stage s, const interaction *here, incidence in, mask lit, real open, vec to_viewer,
+                    light_record light, phong_material l, world w) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < facet_count(s.bounce, w); ++i) {
         const facet f = facet_of(s, here, i, w);
@@ -13,9 +13,9 @@ INLINE color lit_by(stage s, const spot *here, incidence in, mask lit, real open
 }
 
 // The light of lights without a size.
-INLINE color light_gathered(stage s, const spot *here, vec to_viewer, counters *cost, world w) {
+INLINE color light_gathered(stage s, const interaction *here, vec to_viewer, counters *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
-    const look l = look_of(here, w);
+    const phong_material l = phong_material_of(here, w);
     for (int turn = 0; turn < w.settings->light_count; ++turn) {
         light_record light = w.lights + turn;
         const ray_hit met = queue_met(s.q, turn, s.slot);
@@ -28,9 +28,9 @@ INLINE color light_gathered(stage s, const spot *here, vec to_viewer, counters *
     return color_add(gathered, l.emission);
 }
 
-// The first thing that the eye sees here is a light, or a medium: a spot for depth and coverage, without light of others. `object`: -1
+// The first thing that the eye sees here is a light, or a medium: an interaction for depth and coverage, without light of others. `object`: -1
 // for a light, or the number of the medium's.
-INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real far, real object, mask met) {
+INLINE void interaction_of_light(stage s, interaction *found, vec origin, vec direction, real far, real object, mask met) {
     if (!any_lane(met) || s.bounce > 0) return;
     STATE_KEPT(s, sighting, first, STATE_SIGHTING);
     first.coverage = pick(met, R(1.0), first.coverage);
@@ -42,19 +42,19 @@ INLINE void spot_of_light(stage s, spot *found, vec origin, vec direction, real 
     found->smooth = pick(met, R(0.0), found->smooth);   // no march has written one
     found->object = pick(met, object, found->object);
     found->share = pick(met, R(0.0), found->share);
-    spot_keep(s, found, 0);
+    interaction_keep(s, found, 0);
 }
 
 // A path that has met a light before the surface ends there.
 INLINE void path_ends_at_light(stage s, path *so_far) {
-    STATE_KEPT(s, lamp_before, there, STATE_LAMP_BEFORE);
+    STATE_KEPT(s, light_before, there, STATE_LIGHT_BEFORE);
     const mask met = mask_of(there.met);
     so_far->seen = color_pick(met, color_add(so_far->seen, color_mul(there.shows, so_far->through)), so_far->seen);
     so_far->on_path = number_of(mask_of(so_far->on_path) & ~met);
 }
 
-// Adds the light of the path's present spot, or of the sky past it, to what the path has seen.
-INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const spot *here, color gathered, color mirrored,
+// Adds the light of the path's present interaction, or of the sky past it, to what the path has seen.
+INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const interaction *here, color gathered, color mirrored,
                       int last, world w) {
     mask on_path = mask_of(so_far->on_path);
     const mask found = mask_of(here->found);
@@ -69,9 +69,9 @@ INLINE void path_add(stage s, path *so_far, vec direction, real picture_y, const
 }
 
 // Goes on along the mirrored ray.
-INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const spot *here, color mirrored, world w) {
-    spot seen_first = *here;
-    if (s.bounce > 0) seen_first = spot_kept(s, 0);
+INLINE void path_mirror(stage s, path *so_far, vec direction, ray from_eye, real time, const interaction *here, color mirrored, world w) {
+    interaction seen_first = *here;
+    if (s.bounce > 0) seen_first = interaction_kept(s, 0);
     so_far->through = color_mul(so_far->through, mirrored);
     so_far->origin = vec_along(here->point, lift_of(here, w), here->normal);
     so_far->direction = vec_along(direction, R(-2.0) * vec_dot(direction, here->normal), here->normal);

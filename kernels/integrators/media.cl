@@ -4,7 +4,7 @@
 #include "geometry/clouds.h"
 
 // Finds the paths that a medium scatters before what they have met, and halts them there. Glass has then scattered them, and the stage of
-// spots leaves them alone; in clouds it does with them as at spots. Last rays that are scattered are nobody's.
+// interactions leaves them alone; in clouds it does with them as at interactions. Last rays that are scattered are nobody's.
 STAGE(cross_media) {
     PATH_STAGE_BEGINS(s, w);
     const int is_last = bounce > w.settings->bounces;
@@ -12,26 +12,26 @@ STAGE(cross_media) {
     const camera_sample a = camera_sample_kept(s);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
-    carried with;
+    path_state with;
     if (bounce > 0) {
-        with = carried_kept(s);
+        with = path_state_kept(s);
     } else {
         so_far.origin = arrived.origin;
         so_far.direction = arrived.direction;
         so_far.footprint = arrived.footprint;
         so_far.spread = arrived.spread;
-        with = carried_from_eye(arrived.origin, w);
+        with = path_state_from_eye(arrived.origin, w);
         if (KEEPS(s, STATE_FLIGHT)) path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT, mask_of(so_far.on_path), w);
     }
     mask on_path = mask_of(so_far.on_path);
-    spot found = spot_kept(s, bounce);
-    real far = way_to_spot(&found, arrived);
+    interaction found = interaction_kept(s, bounce);
+    real far = way_to_interaction(&found, arrived);
     if (is_last) {
         const ray_hit last = queue_met(s.q, 0, s.slot);
         far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
         if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
     }
-    lamp_met(arrived.origin, arrived.direction, bounce == 0, &far, w);
+    light_hit_of(arrived.origin, arrived.direction, bounce == 0, &far, w);
     cloud_place cloud;
     cloud.met = on_path & ~on_path;
     if (HAS(w, CLOUDS)) cloud = path_meets_clouds(s, &here.at, &so_far, &far, on_path, w);
@@ -44,30 +44,30 @@ STAGE(cross_media) {
         STATE_KEEP(s, so_far, STATE_PATH);
         return;
     }
-    spot_of_light(s, &found, arrived.origin, arrived.direction, with.flight, with.medium, scatters);
+    interaction_of_light(s, &found, arrived.origin, arrived.direction, with.flight, with.medium, scatters);
     halt stop = {pick(scatters, HALTED_BY_GLASS, R(0.0)), R(0.0), R(-1.0)};
     if (KEEPS(s, STATE_FLIGHT)) path_was_scattered(s, &here.at, &so_far, &with, scatters, w);
     if (HAS(w, CLOUDS)) {
-        spot_of_light(s, &found, arrived.origin, arrived.direction, cloud.t, cloud.number, cloud.met);
+        interaction_of_light(s, &found, arrived.origin, arrived.direction, cloud.t, cloud.number, cloud.met);
         if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, cloud.met, w);
         path_in_cloud(&so_far, &cloud, cloud.met);
         stop.halted = pick(cloud.met, HALTED_BY_CLOUD, stop.halted);
         stop.anisotropy = cloud.anisotropy;
     }
     STATE_KEEP(s, so_far, STATE_PATH);
-    carried_keep(s, &with);
+    path_state_keep(s, &with);
     STATE_KEEP(s, stop, STATE_HALT);
 }
 
-// What comes through clouds of the light that was asked for.
+// What comes through clouds of the light that was sampled.
 STAGE(pass_clouds) {
     PATH_STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    carried with = carried_kept(s);
+    path_state with = path_state_kept(s);
     STATE_KEPT(s, halt, stop, STATE_HALT);
-    ray asks = queue_ray(s.q, 0, s.slot);
-    asks.far = stop.far;
-    with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, asks, less(R(0.0), stop.far), w));
+    ray shadow_ray = queue_ray(s.q, 0, s.slot);
+    shadow_ray.far = stop.far;
+    with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, shadow_ray, less(R(0.0), stop.far), w));
     if (bounce > 0) with.awaited = limited(with.awaited, w.settings);
-    carried_keep(s, &with);
+    path_state_keep(s, &with);
 }

@@ -7,13 +7,13 @@
 
 // A launch: tiles, a part of their packets, and a part of their samples.
 typedef struct {
-    __global float *film;           // see `pixel_write`
+    __global float *framebuffer;           // see `pixel_write`
     __global scalar *kept;          // [tile][number of a pixel][packet][lane]
     __global uint *statistics;      // [tile of the launch][packet][STATISTICS]
     __global const int4 *places;    // of each tile: its top left pixel, x and y; its number in `kept`
     view_record view;
     __constant const struct Sampling *sampling;
-    __global const int *slots;      // places of channels in the film, then of a pixel's numbers in `kept`; -1: not wanted
+    __global const int *slots;      // places of channels in the framebuffer, then of a pixel's numbers in `kept`; -1: not wanted
     int channel_count, kept_count;
     int first_packet, end_packet;
     int first, end;                 // samples
@@ -28,7 +28,7 @@ INLINE void kept_number(__global scalar *kept, __global const int *slots, int nu
     else *value = lanes_load(at);
 }
 
-// All numbers of a struct, from the kept number `first` on: KEPT numbers them in the order of `pixel`, `parts` and `mattes`.
+// All numbers of a struct, from the kept number `first` on: KEPT numbers them in the order of `pixel`, `parts` and `cryptomatte`.
 #define KEPT_NUMBER(i) kept_number(kept, slots, first + i, write, numbers + i);
 #define KEPT_NUMBERS(name, type, begins)                                                                                   \
     INLINE void name(__global scalar *kept, __global const int *slots, int write, type *sums) {                            \
@@ -38,7 +38,7 @@ INLINE void kept_number(__global scalar *kept, __global const int *slots, int nu
     }
 KEPT_NUMBERS(kept_pixel, pixel, 0)
 KEPT_NUMBERS(kept_parts, parts, NUMBERS_OF(pixel))
-KEPT_NUMBERS(kept_mattes, mattes, KEPT_MATTE_0)
+KEPT_NUMBERS(kept_cryptomatte, cryptomatte, KEPT_CRYPTOMATTE_0)
 
 // A packet of a launch: which one, its pixels, and where its kept data and its statistics begin.
 typedef struct {
@@ -62,10 +62,10 @@ INLINE pixel pixel_before(pass s, const place_in_pass *here) {
     return p;
 }
 
-// The pixels that take this sample: one that is done has fewer shots, and one that has more got them before this pass was
+// The pixels that take this sample: one that is done has fewer samples, and one that has more got them before this pass was
 // interrupted.
 INLINE mask sample_wanted(pass s, const packet_pixels *at, const pixel *p, int sample) {
-    mask active = at->in_region & equal(p->shots, (real)((scalar)sample));
+    mask active = at->in_region & equal(p->samples, (real)((scalar)sample));
     // Lane by lane: a pixel's samples must not depend on its neighbours in the packet.
     if (s.sampling->adaptive && sample > 0 && sample >= s.sampling->min_samples && (sample & 3) == 0) {
         active &= less((real)(s.sampling->noise), noise_of(p, s.sampling->transparent));
@@ -93,14 +93,14 @@ INLINE void sample_of_lens(const packet_pixels *at, int sample, uint seed, view_
 }
 
 // Adds one sample to the sums of the packet's pixels; `offset`: its distance squared from the middle, pixels.
-INLINE void sample_add(pass s, pixel *p, shot found, mask active, real offset) {
+INLINE void sample_add(pass s, pixel *p, pixel_sample found, mask active, real offset) {
     pixel_add(p, found, active, offset);
     if (s.sampling->adaptive) noise_add(p, found, active);
 }
 
-// Writes what the pixels have so far: means to the film, and sums for a later pass.
+// Writes what the pixels have so far: means to the framebuffer, and sums for a later pass.
 INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
-    pixel_write(s.film + here->tile * s.channel_count * TILE_PIXELS, s.slots, here->at.place, p);
+    pixel_write(s.framebuffer + here->tile * s.channel_count * TILE_PIXELS, s.slots, here->at.place, p);
     if (s.mode & PASS_KEEP) kept_pixel(here->kept, s.slots + CHANNEL_COUNT, 1, p);
 }
 
@@ -108,8 +108,8 @@ INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
 INLINE void count_waits_from(pass s, const place_in_pass *here) { if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u; }
 
 // Counts what the launch has done for the packet, or adds to what was counted.
-INLINE void pass_count(const place_in_pass *here, int add, real shots, real hits, counters cost) {
-    const real counts[STATISTIC_WAITS] = {shots, hits, cost.steps, cost.count, cost.bad};
+INLINE void pass_count(const place_in_pass *here, int add, real samples, real hits, counters cost) {
+    const real counts[STATISTIC_WAITS] = {samples, hits, cost.steps, cost.count, cost.bad};
 #define ADD_COUNT(i) here->sums[i] = (add ? here->sums[i] : 0u) + (uint)lanes_sum(counts[i]);
     FOR_NUMBERS(STATISTIC_WAITS, ADD_COUNT)
 }

@@ -1,6 +1,6 @@
 // What the stages of paths include.
 #include "integrators/light_stages.h"
-#include "integrators/shots.h"
+#include "integrators/pixel_samples.h"
 #include "shading/bsdf.h"
 #include "shading/bsdf_bumped.h"
 #include "integrators/events.h"
@@ -12,5 +12,5 @@
 #include "shading/flights.h"
 #include "shading/media.h"
 #include "integrators/glass_paths.h"
-#include "shading/light_asks.h"
+#include "shading/light_sampling.h"
 #include "integrators/path_steps.h"

@@ -1,5 +1,5 @@
 // Random walks within the set: a path goes from scattering to scattering until it is where it leaves the set, or meets an object
-// or a lamp that stands within. All of it counts as one bounce.
+// or a light that stands within. All of it counts as one bounce.
 //
 // A walk begins where the set does: a ray starts where another has met the surface, which may be some footprints before it or a part of
 // one in it. So the entrance is looked for on both sides, and halved down to a small part of a free path. Flights from there on are
@@ -12,9 +12,9 @@
 // What a lane's path carries on its walk, beside its ray.
 typedef struct {
     path so_far;
-    carried with;
+    path_state with;
     vec entrance, back;      // where it came in, and the way out from there
-    real stop;               // how far its ray goes: to the end of the flight, or to an object or a lamp that is nearer ...
+    real stop;               // how far its ray goes: to the end of the flight, or to an object or a light that is nearer ...
     real object, number;     // ... how far the object is, and which one
     real scatterings, draws; // the former below 0 until any place within is known
     mask open;               // whether a place outside, before the entrance, is known
@@ -47,7 +47,7 @@ INLINE void walk_flies(march *m, walk *a, mask here, world w) {
     a->object = pick(here, met, a->object);
     a->number = pick(here, number, a->number);
     stop = fmin(stop, met);
-    lamp_met(m->r.origin, m->r.direction, 0, &stop, w);
+    light_hit_of(m->r.origin, m->r.direction, 0, &stop, w);
     a->stop = pick(here, stop, a->stop);
     m->r.far = pick(here, (real)(REAL_LARGEST), m->r.far);
 }
@@ -160,8 +160,8 @@ INLINE void walk_takes(walk *a, const int *places, uint fresh, __global const sc
     if (fresh == 0) return;
 #define TAKE_OF_PATH(i) lanes_take((real *)&a->so_far + i, state + (at[STATE_PATH] + i) * stride, places, fresh);
     WRITTEN_OUT(NUMBERS_OF(path), TAKE_OF_PATH)
-#define TAKE_OF_CARRIED(i) lanes_take((real *)&a->with + i, state + carried_number(at, i) * stride, places, fresh);
-    WRITTEN_OUT(NUMBERS_OF(carried), TAKE_OF_CARRIED)
+#define TAKE_OF_PATH_STATE(i) lanes_take((real *)&a->with + i, state + path_state_number(at, i) * stride, places, fresh);
+    WRITTEN_OUT(NUMBERS_OF(path_state), TAKE_OF_PATH_STATE)
     const mask here = lanes_of_bits(fresh);
     a->scatterings = pick(here, R(-1.0), a->scatterings);
     a->open &= ~here;
@@ -178,7 +178,7 @@ INLINE void walk_puts(const march *m, const walk *a, const int *places, uint end
     so_far.direction = m->r.direction;
 #define PUT_OF_PATH(i) lanes_put(((const real *)&so_far)[i], state + (at[STATE_PATH] + i) * stride, places, ended);
     WRITTEN_OUT(NUMBERS_OF(path), PUT_OF_PATH)
-    const int flight = carried_number(at, (int)(&a->with.flight - (real *)&a->with));
+    const int flight = path_state_number(at, (int)(&a->with.flight - (real *)&a->with));
     lanes_put((real)(REAL_LARGEST), state + flight * stride, places, ended);
 #define PUT_OF_RAY(i) lanes_put(((const real *)&m->r)[i], q.rays + i * q.stride, places, ended);
     WRITTEN_OUT(RAY_FAR + 1, PUT_OF_RAY)

@@ -2,7 +2,7 @@
 #include "integrators/path_stages.h"
 
 // Goes on from an event, over the boundary of a body if the direction leads there; where that is hidden a path goes on as it came.
-INLINE void path_leaves(stage s, const packet_pixels *at, path *so_far, carried *with, const event *e, const spot *here, border edge,
+INLINE void path_leaves(stage s, const packet_pixels *at, path *so_far, path_state *with, const event *e, const interaction *here, border edge,
                         const pbr *p, color weights, real place, mask lands, world w) {
     const path came = *so_far;
     const mask sinks = path_goes_on(s, at, so_far, with, e, w);
@@ -18,10 +18,10 @@ STAGE(scatter_paths) {
     PATH_STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const camera_sample a = camera_sample_kept(s);
-    spot found = spot_kept(s, bounce);
+    interaction found = interaction_kept(s, bounce);
     path so_far;
     const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
-    carried with;
+    path_state with;
     const halt stop = path_carries(s, &so_far, &with, arrived.origin, w);
     const mask by_glass = equal(stop.halted, HALTED_BY_GLASS), in_cloud = equal(stop.halted, HALTED_BY_CLOUD);
     const real left_alone = pick(by_glass, so_far.on_path, R(0.0));
@@ -31,7 +31,7 @@ STAGE(scatter_paths) {
     with.awaited = black;
     so_far.on_path = number_of(scatters);
     const mask emerges = path_comes_out(bounce, &with, &found, arrived.direction, lands, w), none = lands & ~lands;
-    ray asks = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
+    ray shadow_ray = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
     color reflects = white, weights = white;
     event e;
@@ -39,7 +39,7 @@ STAGE(scatter_paths) {
     border edge = {R(0.0), none, none, R(0.0)};
     real in_spectrum = R(0.0), unused;
     if (any_lane(lands)) {
-        p = pbr_of_spot(s, &found, w);
+        p = pbr_of_interaction(s, &found, w);
         if (HAS(w, GLASS)) {
             path_square(s, &here.at, PURPOSE_WAVE, w, &in_spectrum, &unused);
             edge = border_at(&with, &found, lands, w);
@@ -47,26 +47,26 @@ STAGE(scatter_paths) {
             outward = vec_pick(edge.leaving, vec_scale(outward, R(-1.0)), outward);
         }
         p.emerges = number_of(emerges);
-        spot_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), lands & ~edge.hidden & ~emerges, w);
+        interaction_shines(s, &so_far, &with, &found, color_scale(p.emission_color, p.emission_luminance), lands & ~edge.hidden & ~emerges, w);
         if (KEEPS(s, STATE_AOVS)) reflects = pbr_albedo(&p, w.albedos);
         const vec to_viewer = vec_pick(emerges, found.normal, vec_scale(arrived.direction, R(-1.0)));
-        e.surface = bsdf_of_spot(s, &found, &p, edge.leaving, to_viewer, &shading, w);
+        e.surface = bsdf_of_interaction(s, &found, &p, edge.leaving, to_viewer, &shading, w);
     }
     if (any_lane(scatters)) {
         event_placed(&e, so_far.origin, &found, shading, outward, in_cloud, w);
         e.behind = edge.leaving;
-        // The boundary of a body would bend the way out of it: nobody asks from inside.
+        // The boundary of a body would bend the way out of it: nobody samples light from inside.
         e.shut = in_cloud & ~equal(with.medium, R(0.0));
         e.medium = (medium_event){arrived.direction, stop.anisotropy};
         so_far.origin = vec_pick(scatters, e.from, so_far.origin);
         with.total = weight_of_all(e.from, e.own, w);
-        const light_ray light = path_asks(s, &here.at, &e, with.total, w, &with.awaited);
+        const light_ray light = path_samples_light(s, &here.at, &e, with.total, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
         if (bounce > 0 && !HAS(w, CLOUDS)) with.awaited = limited(with.awaited, w.settings);
-        asks.origin = e.from;
-        asks.direction = light.toward;
-        asks.far = pick(scatters & ~edge.hidden, light.distance, R(-1.0));
-        asks.footprint = pick(in_cloud, so_far.footprint, found.cone) * (real)(w.settings->shadow_detail);
+        shadow_ray.origin = e.from;
+        shadow_ray.direction = light.toward;
+        shadow_ray.far = pick(scatters & ~edge.hidden, light.distance, R(-1.0));
+        shadow_ray.footprint = pick(in_cloud, so_far.footprint, found.cone) * (real)(w.settings->shadow_detail);
         if (HAS(w, GLASS)) awaited_absorbed(&with, edge, light.distance, w);
         path_leaves(s, &here.at, &so_far, &with, &e, &found, edge, &p, weights, in_spectrum, lands, w);
         path_widens(s, &so_far, &found, from_eye, a.time, lands, w);
@@ -76,7 +76,7 @@ STAGE(scatter_paths) {
         walk_seeded(s, &here.at, &with, lands, w);
     }
     if (KEEPS(s, STATE_HALT)) {
-        const halt over = {R(0.0), R(0.0), asks.far};
+        const halt over = {R(0.0), R(0.0), shadow_ray.far};
         STATE_KEEP(s, over, STATE_HALT);
         so_far.on_path += left_alone;
     }
@@ -86,6 +86,6 @@ STAGE(scatter_paths) {
     }
     with.awaited = color_pick(scatters, with.awaited, black);
     STATE_KEEP(s, so_far, STATE_PATH);
-    carried_keep(s, &with);
-    send_clipped(s, 0, asks, R(0.0), WHETHER, scatters & less(R(0.0), asks.far), w);
+    path_state_keep(s, &with);
+    send_clipped(s, 0, shadow_ray, R(0.0), WHETHER, scatters & less(R(0.0), shadow_ray.far), w);
 }

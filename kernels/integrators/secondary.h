@@ -1,5 +1,5 @@
-// Rays that leave the surface for its light. Lights without a size have one ray each, which `find_spots` sends; where any has a size, or rays go
-// into the hemisphere, stages of their own send all (`wide_lights.h`).
+// Rays that leave the surface for its light. Lights without a size have one ray each, which `find_interactions` sends; where any has a size, or
+// rays go into the hemisphere, stages of their own send all (`wide_lights.h`).
 
 INLINE color limited(color c, march_record settings) { return color_limited(c, (real)(settings->firefly_limit)); }
 
@@ -9,13 +9,13 @@ INLINE void path_sees(stage s, path *so_far, color more, mask here, world w) {
     so_far->seen = color_pick(here, color_add(so_far->seen, more), so_far->seen);
 }
 
-// How far a ray goes to the spot that it has met.
-INLINE real way_to_spot(const spot *found, ray arrived) {
+// How far a ray goes to the interaction that it has met.
+INLINE real way_to_interaction(const interaction *found, ray arrived) {
     return pick(mask_of(found->found), vec_dot(vec_sub(found->seen, arrived.origin), arrived.direction), (real)(REAL_LARGEST));
 }
 
-// Sends the ray of a turn from a spot to where light may come from. `reaches`: how far it must be known what is met, see queue.h.
-INLINE void send_to_light(stage s, int turn, const spot *here, incidence in, real reaches, mask wanted, world w) {
+// Sends the ray of a turn from an interaction to where light may come from. `reaches`: how far it must be known what is met, see queue.h.
+INLINE void send_to_light(stage s, int turn, const interaction *here, incidence in, real reaches, mask wanted, world w) {
     ray r;
     r.origin = vec_along(here->point, lift_of(here, w), here->normal);
     r.direction = in.toward;
@@ -27,8 +27,8 @@ INLINE void send_to_light(stage s, int turn, const spot *here, incidence in, rea
     send_clipped(s, turn, r, R(0.0), reaches, wanted & faces(s, here, in.toward, w), w);
 }
 
-// Sends a spot's rays to lights without a size, one to each. (Faces of cuts have none in this light.)
-INLINE void send_to_small_lights(stage s, const spot *here, int turns, world w) {
+// Sends an interaction's rays to lights without a size, one to each. (Faces of cuts have none in this light.)
+INLINE void send_to_small_lights(stage s, const interaction *here, int turns, world w) {
     const mask found = mask_of(here->found) & ~on_face(here);
     for (int turn = 0; turn < turns; ++turn) {
         if (!any_lane(found)) {

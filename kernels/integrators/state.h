@@ -1,14 +1,14 @@
-// What is kept of a shot between its stages, for each pixel of a wave; `clfractal/integrators/state.py` declares it.
+// What is kept of a sample between its stages, for each pixel of a wave; `clfractal/integrators/state.py` declares it.
 #include "integrators/stage.h"
 
-INLINE mask on_face(const spot *here) { return is_face(here->object); }
+INLINE mask on_face(const interaction *here) { return is_face(here->object); }
 
-// Around a spot are places where the heights of its material's relief are compared, see bump_places.h.
-#define AT_SPOT (-1)
+// Around an interaction are places where the heights of its material's relief are compared, see bump_places.h.
+#define AT_INTERACTION (-1)
 #define BUMP_PLACES 3
 
 #define FEW(type) (NUMBERS_OF(type) <= MOST_NUMBERS)
-typedef char structs_are_small[FEW(camera_sample) && FEW(spot) && FEW(path) && FEW(carried) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
+typedef char structs_are_small[FEW(camera_sample) && FEW(interaction) && FEW(path) && FEW(path_state) && FEW(pixel) && FEW(plane_face) && FEW(plane_layers) ? 1 : -1];
 
 // What has halted a path before what it had met.
 #define HALTED_BY_GLASS R(1.0)   // which has scattered it
@@ -25,9 +25,9 @@ INLINE __global scalar *state_part(stage s, int part) { return s.state + s.at[pa
 #define STATE_KEEP_ONE(s, thing, part, i) KEEP(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 #define STATE_RECALL_ONE(s, thing, part, i) RECALL(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 
-// What the formula answers for the spot's material, or at a place around it; and the normal and escape count there.
+// What the formula answers for the interaction's material, or at a place around it; and the normal and escape count there.
 INLINE __global scalar *asked_at(stage s, int place, int i, world w) {
-    if (place == AT_SPOT) return state_part(s, STATE_ASKED) + i * s.stride;
+    if (place == AT_INTERACTION) return state_part(s, STATE_ASKED) + i * s.stride;
     return state_part(s, STATE_BESIDE) + (place * (w.settings->bump_asked + 4 * w.settings->bump_surface) + i) * s.stride;
 }
 INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return asked_at(s, place, w.settings->bump_asked, w); }
@@ -48,21 +48,21 @@ INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return 
         return thing;                                                                                                       \
     }
 OF_SLICES(camera_sample, CAMERA_SAMPLE_SLICES, {R(0.0)})
-OF_SLICES(spot, SPOT_SLICES, {R(0.0)})
-#define IN_THE_OPEN ((carried){.wave = R(-1.0), .flight = (real)(REAL_LARGEST)})
-OF_SLICES(carried, CARRIED_SLICES, IN_THE_OPEN)
+OF_SLICES(interaction, INTERACTION_SLICES, {R(0.0)})
+#define IN_THE_OPEN ((path_state){.wave = R(-1.0), .flight = (real)(REAL_LARGEST)})
+OF_SLICES(path_state, PATH_STATE_SLICES, IN_THE_OPEN)
 
 #define camera_sample_keep(s, a) camera_sample_keep_one(s, a, 0)
 #define camera_sample_kept(s) camera_sample_kept_one(s, 0)
-// The first spot, or that after the last bounce.
-#define spot_keep(s, here, bounce) spot_keep_one(s, here, (bounce) > 0)
-#define spot_kept(s, bounce) spot_kept_one(s, (bounce) > 0)
-#define carried_keep(s, with) carried_keep_one(s, with, 0)
-#define carried_kept(s) carried_kept_one(s, 0)
+// The first interaction, or that after the last bounce.
+#define interaction_keep(s, here, bounce) interaction_keep_one(s, here, (bounce) > 0)
+#define interaction_kept(s, bounce) interaction_kept_one(s, (bounce) > 0)
+#define path_state_keep(s, with) path_state_keep_one(s, with, 0)
+#define path_state_kept(s) path_state_kept_one(s, 0)
 
 // Where a number of it is kept.
-INLINE int carried_number(__constant const int *at, int number) {
-    if (number < ASKED_LIGHT_NUMBERS) return at[STATE_ASKED_LIGHT] + number;
-    number -= ASKED_LIGHT_NUMBERS;
+INLINE int path_state_number(__constant const int *at, int number) {
+    if (number < DIRECT_LIGHT_NUMBERS) return at[STATE_DIRECT_LIGHT] + number;
+    number -= DIRECT_LIGHT_NUMBERS;
     return number < WITHIN_NUMBERS ? at[STATE_WITHIN] + number : at[STATE_FLIGHT] + number - WITHIN_NUMBERS;
 }

@@ -1,5 +1,5 @@
 // A packet's pixels in its tile. A tile is TILE x TILE pixels, its pixels numbered along the Morton curve: any LANES in a row
-// form a compact patch whose rays stay together. Film layout: [tile][channel][row][column], TILE x TILE floats a channel.
+// form a compact patch whose rays stay together. Framebuffer layout: [tile][channel][row][column], TILE x TILE floats a channel.
 #define TILE_PIXELS (TILE * TILE)
 // Blocks of BLOCK x BLOCK pixels stand one after the other on the curve.
 #define BLOCK 8
@@ -43,12 +43,12 @@ INLINE packet_pixels packet_at(int packet, int2 corner, view_record view) {
     return p;
 }
 
-// `slot`: the channel's place among the wanted ones, or -1; `film` begins at the tile.
-INLINE void write_channel(__global float *film, int slot, const int *place, real value) {
+// `slot`: the channel's place among the wanted ones, or -1; `framebuffer` begins at the tile.
+INLINE void write_channel(__global float *framebuffer, int slot, const int *place, real value) {
     if (slot < 0) return;
     scalar each[LANES];
     lanes_store(value, each);
-    __global float *to = film + slot * TILE_PIXELS;
+    __global float *to = framebuffer + slot * TILE_PIXELS;
 #if LANES >= 8
     // Four in a row: the curve goes through 2 x 2 pixels, then through those right of them, then through the 4 x 2 below.
     for (int row = 0; row < LANES / 4; ++row) {

@@ -11,10 +11,10 @@ INLINE vec soft_light(stage s, const packet_pixels *at, vec point, vec toward, i
     return light_direction(light, point, toward, u, v);
 }
 
-// Ray `turn` of the hemisphere over a spot: the first `cosine_rays` are spread like the cosine, the others like the
+// Ray `turn` of the hemisphere over an interaction: the first `cosine_rays` are spread like the cosine, the others like the
 // environment's brightness. `strength` is the weight of what it brings, cosine / pi over the density of both kinds together
 // (the balance heuristic, Veach and Guibas 1995).
-INLINE incidence ambient_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w) {
+INLINE incidence ambient_ray(stage s, const packet_pixels *at, const interaction *here, int turn, world w) {
     const int by_cosine = turn < w.settings->cosine_rays;
     const int number = by_cosine ? w.settings->cosine_rays : w.settings->map_rays;
     const int place = by_cosine ? turn : turn - w.settings->cosine_rays;
@@ -48,7 +48,7 @@ INLINE __global scalar *ambient_strength(stage s, int turn) {
 }
 
 // The light that the ray brings from the environment to a surface that scatters the part `diffuse` of it; the ray also counts towards the open part of the hemisphere.
-INLINE color ambient_light(stage s, const spot *here, int turn, ray_hit met, real diffuse, world w, real *open) {
+INLINE color ambient_light(stage s, const interaction *here, int turn, ray_hit met, real diffuse, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
         const mask near = mask_of(met.hit) & less(met.t, (real)(w.settings->occlusion_distance));
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
@@ -60,14 +60,14 @@ INLINE color ambient_light(stage s, const spot *here, int turn, ray_hit met, rea
     return color_of(bright.r * here->tint.r * share, bright.g * here->tint.g * share, bright.b * here->tint.b * share);
 }
 
-// The turns of the rays that leave a spot: first those into the hemisphere, then each light's.
+// The turns of the rays that leave an interaction: first those into the hemisphere, then each light's.
 INLINE int hemisphere_turns(world w) { return w.settings->cosine_rays + w.settings->map_rays; }
 
-// All turns of a spot.
+// All turns of an interaction.
 INLINE int turns_for_light(world w) { return hemisphere_turns(w) + w.settings->light_count * w.settings->light_rays + w.settings->set_rays; }
 
 // The direction that a ray of this turn takes, and whether anything may be in its way; false for turns that a light does not need.
-INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn, world w, incidence *in, mask *wanted) {
+INLINE int turn_ray(stage s, const packet_pixels *at, const interaction *here, int turn, world w, incidence *in, mask *wanted) {
     if (turn < hemisphere_turns(w)) {
         *in = ambient_ray(s, at, here, turn, w);
         return 1;
@@ -93,8 +93,8 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const spot *here, int turn
     return 1;
 }
 
-// Sends all rays that leave a spot for its light. (Faces of cuts have none in this light.)
-INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const spot *here, int turns, world w) {
+// Sends all rays that leave an interaction for its light. (Faces of cuts have none in this light.)
+INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const interaction *here, int turns, world w) {
     const mask found = mask_of(here->found) & ~on_face(here);
     for (int turn = 0; turn < turns; ++turn) {
         incidence in;
@@ -111,7 +111,7 @@ INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const spot *he
 }
 
 // The light of one of the rays to balls on the set. (After the lights stands one that is white, for them.)
-INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, int of_set, real open, look l,
+INLINE color set_gathered(stage s, const interaction *here, vec to_viewer, int turn, int of_set, real open, phong_material l,
                           counters *cost, world w) {
     const place_in_pass place = place_of_packet(s.span, s.packet, s.tile);
     const ray_hit met = queue_met(s.q, turn, s.slot);
@@ -125,10 +125,10 @@ INLINE color set_gathered(stage s, const spot *here, vec to_viewer, int turn, in
     return color_scale(color_mul(white, shines), (real)(S(1.0) / (scalar)w.settings->set_rays));
 }
 
-// The light that the spot's rays have brought.
-INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, counters *cost, world w) {
+// The light that the interaction's rays have brought.
+INLINE color wide_light_gathered(stage s, const interaction *here, vec to_viewer, counters *cost, world w) {
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
-    const look l = look_of(here, w);
+    const phong_material l = phong_material_of(here, w);
     real open = R(1.0);
     int turn = 0;
     if (w.settings->occlusion_share > S(0.0)) open = R(0.0);
@@ -159,11 +159,11 @@ INLINE color wide_light_gathered(stage s, const spot *here, vec to_viewer, count
 }
 
 // Keeps what light a path meets before the surface, where it ends.
-INLINE void path_meets_light(stage s, const path *so_far, spot *found, ray arrived, world w) {
-    real far = way_to_spot(found, arrived);
-    const lamp before = lamp_met(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
+INLINE void path_meets_light(stage s, const path *so_far, interaction *found, ray arrived, world w) {
+    real far = way_to_interaction(found, arrived);
+    const light_hit before = light_hit_of(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
     const mask met = mask_of(so_far->on_path) & before.met;
-    const lamp_before there = {number_of(met), before.shows};
-    STATE_KEEP(s, there, STATE_LAMP_BEFORE);
-    spot_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), met);
+    const light_before there = {number_of(met), before.shows};
+    STATE_KEEP(s, there, STATE_LIGHT_BEFORE);
+    interaction_of_light(s, found, arrived.origin, arrived.direction, far, R(-1.0), met);
 }

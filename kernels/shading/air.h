@@ -26,7 +26,7 @@ typedef struct {
 } scattering;
 
 // The place of a light's sample on the way of a ray of length `far`: by what comes through where the light is as strong everywhere, and
-// by the angle at a lamp (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
+// by the angle at a light (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
 INLINE real scattering_place(ray r, real far, real u, light_record light, material_record m, real *weight) {
     if (light->kind == LIGHT_DIRECTIONAL || (!light_is_seen(light) && !light->inverse_square)) {
         const real depth = pick(less(far, R(1e30)), fog_depth(r.origin, r.direction, fmin(far, R(1e30)), m),
@@ -69,8 +69,8 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
 }
 
 // How far a ray from the eye goes through the fog.
-INLINE real way_in_fog(stage s, ray r, const spot *here, world w) {
-    real far = way_to_spot(here, r);
-    lamp_met(r.origin, r.direction, 1, &far, w);
+INLINE real way_in_fog(stage s, ray r, const interaction *here, world w) {
+    real far = way_to_interaction(here, r);
+    light_hit_of(r.origin, r.direction, 1, &far, w);
     return far;
 }

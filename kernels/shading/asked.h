@@ -22,7 +22,7 @@ INLINE real mean_curvature(vec point, vec normal, mask active, material_record m
     return mean / fmax(R(1.0) - mean * step, R(0.1));
 }
 
-INLINE real asked_quantity(const spot *here, mask active, material_record m, orbit_record orbit, constants k) {
+INLINE real asked_quantity(const interaction *here, mask active, material_record m, orbit_record orbit, constants k) {
     if (m->asks == MAP_CURVATURE) return mean_curvature(here->point, here->normal, active, m, orbit, k);
     if (m->asks == MAP_THICKNESS) return set_thickness(here->point, vec_scale(here->normal, R(-1.0)), here->cone, active, m, orbit, k);
     if (m->asks == MAP_LAYER_DISTANCE) return layer_distance(here->point, here->normal, active, m, orbit, k);

@@ -1,8 +1,8 @@
-// A material at a spot: `pbr`, generated from clfractal/shading/materials.py, and made ready to scatter.
+// A material at an interaction: `pbr`, generated from clfractal/shading/materials.py, and made ready to scatter.
 #include "shading/bsdf_glass.h"
 #include "pbr.h"
 
-// A material at a spot, ready to scatter.
+// A material at an interaction, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
     vec out;                // ... and in it the direction to the viewer

@@ -1,9 +1,10 @@
 // The relief of a material: the normal of the surface moved up by a height, n' ~ n - the height's gradient along the surface (Blinn 1978; as
-// the surface gradient of Mikkelsen 2010). The gradient is that of the plane through the heights at three places around the spot, which are
-// a footprint apart. Of a picture the shares of its three sides are the spot's (Mikkelsen 2020, "Surface gradient-based bump mapping framework").
+// the surface gradient of Mikkelsen 2010). The gradient is that of the plane through the heights at three places around the interaction, which
+// are a footprint apart. Of a picture the shares of its three sides are the interaction's (Mikkelsen 2020, "Surface gradient-based bump mapping
+// framework").
 
-// How high the relief of a spot's material is at a place around it.
-INLINE real height_at(stage s, const spot *there, int place, world w) {
+// How high the relief of an interaction's material is at a place around it.
+INLINE real height_at(stage s, const interaction *there, int place, world w) {
     // As `pbr_at` mixes the parts of blends.
     real shares[MOST_MATERIALS], height = R(0.0);
     for (int i = 0; i < w.settings->material_count; ++i) shares[i] = material_share(there, i, w);
@@ -22,15 +23,15 @@ INLINE real height_at(stage s, const spot *there, int place, world w) {
     return height;
 }
 
-// The slope of a spot's relief, as the viewer's side of the surface has it.
-CALLED relief relief_at(stage s, const spot *here, world w) {
+// The slope of an interaction's relief, as the viewer's side of the surface has it.
+CALLED relief relief_at(stage s, const interaction *here, world w) {
     relief found = {R(0.0), vec_of(R(0.0), R(0.0), R(0.0))};
     const real width = bump_width(here, w);
     const mask rises = less(R(0.0), width);
     if (!any_lane(rises)) return found;
     vec slope = found.slope;
     for (int place = 0; place < TURNS(BUMP_PLACES); ++place) {
-        const spot there = bump_spot(here, width, place);
+        const interaction there = bump_interaction(here, width, place);
         slope = vec_along(slope, height_at(s, &there, place, w), bump_way(here->normal, place));
     }
     // The corners' ways add up to 0, and their squares to 3/2 in each direction.

@@ -1,4 +1,4 @@
-// Places of objects that shine, chosen by paths that ask for them. Nobody asks for an object from inside it. A solid has in its file of
+// Places of objects that shine, chosen by paths that sample them. Nobody samples an object from inside it. A solid has in its file of
 // `elements/shapes/emitters`, for "turned" points outside of it:
 //   emitter_place NAME_place(vec form, vec sides, vec point, real choice, real u, real v, const vec *met)
 //                                                                chooses a place that the point sees, or tells the density of what is `met`
@@ -24,7 +24,7 @@ INLINE emitter_place emitter_place_of(object_record o, vec point, real choice, r
     switch (o->kind) { EMITTERS(PLACE_OF) default: return (emitter_place){point, R(0.0)}; }
 }
 
-// About the irradiance that an object can bring to a point; 0 inside it, and where nobody asks for it.
+// About the irradiance that an object can bring to a point; 0 inside it, and where nobody samples it.
 #define WEIGHT_OF(KIND, name) case SHAPE_##KIND: return name##_weight(vec_splat(o->form), vec_splat(o->sides), point, (real)(o->luminance));
 CALLED real emitter_weight(object_record o, const vec *at) {
     const vec point = emitter_turned(o, vec_sub(*at, vec_splat(o->middle)));
@@ -35,7 +35,7 @@ CALLED emitter_place emitter_chosen(object_record o, const vec *at, real choice,
     return emitter_place_of(o, emitter_turned(o, vec_sub(*at, vec_splat(o->middle))), choice, u, v, 0);
 }
 
-// Where a ray from outside meets an object `distance` away: the density with which a place asks for it that has chosen it.
+// Where a ray from outside meets an object `distance` away: the density with which a place samples it that has chosen it.
 CALLED real emitter_density(object_record o, const vec *at, const vec *direction, real distance) {
     const vec point = emitter_turned(o, vec_sub(*at, vec_splat(o->middle)));
     const vec met = vec_along(point, distance, emitter_turned(o, *direction));

@@ -5,7 +5,7 @@
 // each, and is weighed by the chance of it in the mean of all, as if each colour had chosen (the balance heuristic; Wilkie and others 2014,
 // Hero Wavelength Spectral Sampling): no colour weighs more than the sum of all did.
 
-INLINE mask is_participating(const carried *with) { return less(R(0.0), brightest(with->scatters)); }
+INLINE mask is_participating(const path_state *with) { return less(R(0.0), brightest(with->scatters)); }
 
 // What a medium leaves of light on a way through it.
 INLINE color absorbed(color light, color extinction, real way) {
@@ -20,7 +20,7 @@ INLINE color shares_of(color through) {
 }
 
 // Draws the flight; `u` and `choice` in (0, 1).
-INLINE void flight_begins(carried *with, color through, real u, real choice, mask here) {
+INLINE void flight_begins(path_state *with, color through, real u, real choice, mask here) {
     const color shares = shares_of(through), taken = with->extinction;
     const mask red = less(choice, shares.r), green = less(choice, shares.r + shares.g);
     const real of_one = pick(red, taken.r, pick(green, taken.g, taken.b));
@@ -30,7 +30,7 @@ INLINE void flight_begins(carried *with, color through, real u, real choice, mas
 }
 
 // Weighs the path's way to what it has met, `far` away, or to where it is scattered before; the result says where it is.
-INLINE mask flight_ends(path *so_far, const carried *with, real far, mask here) {
+INLINE mask flight_ends(path *so_far, const path_state *with, real far, mask here) {
     here &= is_participating(with);
     const mask scatters = here & less(with->flight, far);
     const real way = fmin(with->flight, far);
@@ -50,7 +50,7 @@ INLINE mask flight_ends(path *so_far, const carried *with, real far, mask here) 
 }
 
 // Turns a path that is scattered, by numbers in (0, 1).
-INLINE void path_turns(path *so_far, const carried *with, real u, real v, mask here) {
+INLINE void path_turns(path *so_far, const path_state *with, real u, real v, mask here) {
     so_far->direction = vec_pick(here, phase_direction(so_far->direction, u, v, with->anisotropy), so_far->direction);
 }
 

@@ -88,11 +88,11 @@ CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, r
 typedef struct {
     mask met;
     color shows;
-    real density, weight;   // with which it is asked from the ray's origin, where lights weigh as much in all as `carried` says
-} lamp;
+    real density, weight;   // with which it is sampled from the ray's origin, where lights weigh as much in all as `path_state` says
+} light_hit;
 
-INLINE lamp lamp_met(vec origin, vec direction, int of_eye, real *far, world w) {
-    lamp found = {less(R(1.0), R(0.0)), color_of(R(0.0), R(0.0), R(0.0)), R(0.0), R(0.0)};
+INLINE light_hit light_hit_of(vec origin, vec direction, int of_eye, real *far, world w) {
+    light_hit found = {less(R(1.0), R(0.0)), color_of(R(0.0), R(0.0), R(0.0)), R(0.0), R(0.0)};
     found.met = nearest_light(&origin, &direction, of_eye, far, &found.shows, &found.density, &found.weight, w);
     return found;
 }

@@ -1,4 +1,4 @@
-// Lights as paths ask for them: a direction to a place of a light, its density, and where a ray meets one.
+// Lights as paths sample them: a direction to a place of a light, its density, and where a ray meets one.
 //
 // A delta light comes from one direction: its density is 0 and `light` the irradiance of a surface that faces it. Of others `light` is
 // radiance, and light / density the estimate of irradiance.
@@ -58,16 +58,16 @@ INLINE real power_share(real own, real other) {
     return square / fmax(square + other * other, (real)(REAL_SMALLEST));
 }
 
-// A light that was asked for: the ray to it, and the probability of having asked.
+// A light that was sampled: the ray to it, and the probability of having chosen it.
 typedef struct {
     light_ray ray;
     real share;            // of all lights, that this one is chosen
     real reckoned;         // a factor on the density with which both ways to find it reckon
     mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
-} asked;
+} sampled_light;
 
 // Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
-#define ASKING_NUMBERS 5
+#define LIGHT_SAMPLE_NUMBERS 5
 
 // How one of all lights is chosen by what it can bring to `from`: they lie in a row, each as long as its weight, and `place` is on one of them.
 typedef struct {
@@ -75,7 +75,7 @@ typedef struct {
     real own;                   // the object whose surface it is, or 0: no object lights itself
     real total, place, before;  // all weights; where the choice lies; the weights so far
     mask open;                  // whether none is chosen so far
-    asked found;
+    sampled_light found;
     vec begin;                  // where the ray to it begins
 } choosing;
 

@@ -7,7 +7,7 @@ INLINE real with_lights_beside(real sum, vec point, real own, world w) {
 }
 
 // One of the balls, where no other light is chosen.
-CALLED void set_asked(choosing *c, const real *numbers, world w) {
+CALLED void sample_set_light(choosing *c, const real *numbers, world w) {
     const real weight = set_weight(&c->from, w);
     const mask here = c->open & less(R(0.0), weight);
     if (!any_lane(here)) return;
@@ -26,7 +26,7 @@ CALLED void set_asked(choosing *c, const real *numbers, world w) {
     c->begin = vec_pick(here, c->point, c->begin);
 }
 
-INLINE void lights_beside_asked(choosing *c, const real *numbers, world w) {
-    if (HAS(w, EMITTERS)) emitter_asked(c, numbers, w);
-    if (w.settings->set_count > 0) set_asked(c, numbers, w);
+INLINE void sample_lights_beside(choosing *c, const real *numbers, world w) {
+    if (HAS(w, EMITTERS)) sample_emitter(c, numbers, w);
+    if (w.settings->set_count > 0) sample_set_light(c, numbers, w);
 }

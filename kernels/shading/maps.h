@@ -56,8 +56,8 @@ INLINE color picture_at(vec point, vec normal, real cone, map_record m, __global
     return color_add(mixed, color_scale(picture_color(point.x * wide, -point.y * high, level, m, tables), z / sum));
 }
 
-// What the surface is around a spot: its normal and its escape count. On objects beside the set these are the object's.
-INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, real *smooth, world w) {
+// What the surface is around an interaction: its normal and its escape count. On objects beside the set these are the object's.
+INLINE void surface_beside(stage s, const interaction *there, int place, vec *normal, real *smooth, world w) {
     *normal = there->normal;
     *smooth = there->smooth;
     if (!w.settings->bump_surface) return;
@@ -74,12 +74,12 @@ INLINE void surface_beside(stage s, const spot *there, int place, vec *normal, r
     }
 }
 
-// At a spot, where `place` is AT_SPOT, or at a place around it.
-INLINE real map_quantity(stage s, const spot *here, int place, map_record m, world w) {
+// At an interaction, where `place` is AT_INTERACTION, or at a place around it.
+INLINE real map_quantity(stage s, const interaction *here, int place, map_record m, world w) {
     const vec given = vec_splat(m->vector);
     vec normal = here->normal;
     real smooth = here->smooth;
-    if (place != AT_SPOT && (m->by == MAP_NORMAL || m->by == MAP_ITERATIONS)) surface_beside(s, here, place, &normal, &smooth, w);
+    if (place != AT_INTERACTION && (m->by == MAP_NORMAL || m->by == MAP_ITERATIONS)) surface_beside(s, here, place, &normal, &smooth, w);
     if (m->by == MAP_NORMAL) return vec_dot(normal, given);
     if (m->by == MAP_HEIGHT) return vec_dot(here->point, given);
     if (m->by == MAP_DISTANCE) {
@@ -90,8 +90,8 @@ INLINE real map_quantity(stage s, const spot *here, int place, map_record m, wor
     return smooth;
 }
 
-// What a map is at a spot: a colour, or three times the same number.
-INLINE color map_at(stage s, const spot *here, int place, map_record m, world w) {
+// What a map is at an interaction: a colour, or three times the same number.
+INLINE color map_at(stage s, const interaction *here, int place, map_record m, world w) {
     real quantity;
     if (m->levels > 0) {
         const color seen = picture_at(here->point, here->normal, here->cone, m, w.tables);

@@ -1,8 +1,8 @@
-// The material of a spot: what paths scatter by.
+// The material of an interaction: what paths scatter by.
 NUMBERS_PICKED(pbr)
 
-// Materials are mixed by the shares that they have in a spot. A colour counts by the light that it colours: that of a body which a medium
-// hides counts for nothing.
+// Materials are mixed by the shares that they have in an interaction. A colour counts by the light that it colours: that of a body which a
+// medium hides counts for nothing.
 typedef struct {
     pbr sum;
     real body, medium;   // how much of the light meets the bodies and the media of all parts
@@ -31,13 +31,13 @@ INLINE pbr pbr_mixed(pbr_mix m, world w) {
 }
 
 // One of the materials that have layers, with its maps.
-CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
+CALLED pbr pbr_mapped(stage s, const interaction *here, int number, world w) {
     __constant const struct Pbr *material = w.materials + number;
     pbr p = pbr_of(material, here->tint);
     real *numbers = (real *)&p;
     for (int i = 0; i < material->map_count; ++i) {
         map_record m = w.maps + material->first_map + i;
-        const color found = map_at(s, here, AT_SPOT, m, w);
+        const color found = map_at(s, here, AT_INTERACTION, m, w);
         numbers[m->number] = found.r;
         if (m->count < 3) continue;
         numbers[m->number + 1] = found.g;
@@ -51,19 +51,19 @@ CALLED pbr pbr_mapped(stage s, const spot *here, int number, world w) {
     return p;
 }
 
-CALLED pbr pbr_at(stage s, const spot *here, world w) {
+CALLED pbr pbr_at(stage s, const interaction *here, world w) {
     if (w.settings->material_count == 1 && w.materials->map_count == 0) return pbr_of(w.materials, here->tint);
     if (w.settings->material_count == 1) return pbr_mapped(s, here, 0, w);
     // The share of each material. Blends come before their parts, and pass theirs on to them.
     real shares[MOST_MATERIALS];
-    const real root = spot_material(here, w);
+    const real root = interaction_material(here, w);
     for (int i = 0; i < w.settings->material_count; ++i) shares[i] = pick(equal(root, (real)((scalar)i)), R(1.0), R(0.0));
     pbr_mix mix = {0};
     for (int i = 0; i < w.settings->material_count; ++i) {
         if (!any_of(shares[i])) continue;
         __constant const struct Pbr *material = w.materials + i;
         if (material->blend[0] >= 0) {
-            const real second = map_at(s, here, AT_SPOT, w.maps + material->mask, w).r;
+            const real second = map_at(s, here, AT_INTERACTION, w.maps + material->mask, w).r;
             shares[material->blend[0]] += shares[i] * (R(1.0) - second);
             shares[material->blend[1]] += shares[i] * second;
             continue;
@@ -76,7 +76,7 @@ CALLED pbr pbr_at(stage s, const spot *here, world w) {
 }
 
 // The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
-INLINE void pbr_of_face(const spot *here, pbr *p) {
+INLINE void pbr_of_face(const interaction *here, pbr *p) {
     const mask face = on_face(here);
     const real none = R(0.0), one = R(1.0);
     const color tint = color_of(fmin(here->tint.r, one), fmin(here->tint.g, one), fmin(here->tint.b, one));
@@ -88,11 +88,11 @@ INLINE void pbr_of_face(const spot *here, pbr *p) {
     *p = pbr_pick(face, matt, *p);
 }
 
-// What a path meets at a spot: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
-INLINE pbr pbr_found(stage s, const spot *here, world w) {
+// What a path meets at an interaction: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
+INLINE pbr pbr_found(stage s, const interaction *here, world w) {
     pbr p = pbr_at(s, here, w);
     if (any_lane(less(R(0.0), here->share))) {
-        spot one = *here, other = one;
+        interaction one = *here, other = one;
         const real quantity = is_colored_at_once(w.material) ? here->smooth : here->quantity;
         other.object = here->other;
         one.share = other.share = R(0.0);

@@ -1,6 +1,6 @@
-// The material of a spot, as paths scatter by it: that of its thing, or what `find_materials` has found out.
+// The material of an interaction, as paths scatter by it: that of its thing, or what `find_materials` has found out.
 
-INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
+INLINE pbr pbr_of_interaction(stage s, const interaction *here, world w) {
     pbr p;
     if (KEEPS(s, STATE_MATTER)) {
         matter_recall(s, &p);
@@ -8,7 +8,7 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
     }
     const color tint = is_colored_at_once(w.material) ? here->tint : tint_of(here, w);
     p = pbr_of(w.materials, tint);
-    const real own = spot_material(here, w);
+    const real own = interaction_material(here, w);
     for (int i = 1; i < w.settings->material_count; ++i) {
         const mask has = equal(own, (real)((scalar)i));
         if (!any_lane(has)) continue;
@@ -21,9 +21,9 @@ INLINE pbr pbr_of_spot(stage s, const spot *here, world w) {
 // Of the way that a surface faces the viewer, what is left at least by slopes that turn it from him.
 #define LEAST_FACING R(0.1)
 
-// The normal of a spot's relief, length 1; `inside`: where the viewer, and so the spot's normal, is in the set. Slopes that would turn
-// the surface away from the viewer are lowered until it faces him.
-INLINE vec bumped_normal(stage s, const spot *here, mask inside, vec to_viewer) {
+// The normal of an interaction's relief, length 1; `inside`: where the viewer, and so the interaction's normal, is in the set. Slopes that
+// would turn the surface away from the viewer are lowered until it faces him.
+INLINE vec bumped_normal(stage s, const interaction *here, mask inside, vec to_viewer) {
     STATE_KEPT(s, relief, known, STATE_RELIEF);
     const mask rises = mask_of(known.rises);
     vec slope = vec_scale(known.slope, pick(inside, R(-1.0), R(1.0)));

@@ -1,4 +1,4 @@
-// The numbers of a spot's material, as they are kept.
+// The numbers of an interaction's material, as they are kept.
 #include "pbr.h"
 
 INLINE void matter_keep(stage s, const pbr *p) {

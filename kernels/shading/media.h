@@ -103,40 +103,40 @@ CALLED medium medium_of(real body, world w) {
 }
 
 // Goes into a body, or leaves it.
-INLINE void media_enter(carried *with, real body, mask here) {
+INLINE void media_enter(path_state *with, real body, mask here) {
     here &= ~equal(body_of(body), body_of(with->medium)) & ~equal(body_of(body), body_of(with->under));
     const mask over = less(with->medium, body);
     with->under = pick(here, pick(over, with->medium, fmax(with->under, body)), with->under);
     with->medium = pick(here & over, body, with->medium);
 }
 
-INLINE void media_leave(carried *with, real body, mask here) {
+INLINE void media_leave(path_state *with, real body, mask here) {
     const mask first = here & equal(body, body_of(with->medium)), second = here & equal(body, body_of(with->under));
     with->medium = pick(first, with->under, with->medium);
     with->under = pick(first | second, R(0.0), with->under);
 }
 
 // The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
-INLINE real way_within(const carried *with, real way, world w) {
+INLINE real way_within(const path_state *with, real way, world w) {
     const real most = R(2.0) * (real)(w.settings->bounds_radius);
     return pick(equal(body_of(with->medium), set_body(w)), fmin(way, most), way);
 }
 
 // Lets a clear medium absorb light on a path's way to what it has met.
-INLINE void path_absorbs(path *so_far, const carried *with, real far, mask here, world w) {
+INLINE void path_absorbs(path *so_far, const path_state *with, real far, mask here, world w) {
     here &= less(R(0.0), with->medium) & ~is_participating(with);
     so_far->through = color_pick(here, absorbed(so_far->through, with->extinction, way_within(with, far, w)), so_far->through);
 }
 
 // Notes what the medium does that a path is in now.
-INLINE void media_found(carried *with, medium found, mask here) {
+INLINE void media_found(path_state *with, medium found, mask here) {
     with->extinction = color_pick(here, found.extinction, with->extinction);
     with->scatters = color_pick(here, found.scatters, with->scatters);
     with->anisotropy = pick(here, found.anisotropy, with->anisotropy);
 }
 
 // The open around the eye, or the glass that it is in.
-INLINE void media_begin(carried *with, vec eye, world w) {
+INLINE void media_begin(path_state *with, vec eye, world w) {
     with->medium = with->under = R(0.0);
     with->wave = R(-1.0);
     for (int i = 0; i < w.settings->object_count; ++i) {
@@ -153,7 +153,7 @@ typedef struct {
     real around;     // the glass that the body stands in, or 0
 } border;
 
-INLINE border border_at(const carried *with, const spot *here, mask lands, world w) {
+INLINE border border_at(const path_state *with, const interaction *here, mask lands, world w) {
     border found;
     mask glass = lands & (HAS(w, GLASS_SET) ? ~0 : 0);
     found.body = set_body(w);
@@ -167,7 +167,7 @@ INLINE border border_at(const carried *with, const spot *here, mask lands, world
         const mask this_one = beside & equal(here->object, (real)((scalar)(i + 1)));
         if (!w.objects[i].glass || !any_lane(this_one)) continue;
         glass |= this_one & lands;
-        // The spot's normal is towards the viewer.
+        // The interaction's normal is towards the viewer.
         found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
     }
     found.around = pick(equal(body_of(with->medium), found.body), with->under, with->medium);
@@ -175,8 +175,8 @@ INLINE border border_at(const carried *with, const spot *here, mask lands, world
     return found;
 }
 
-// Whether a path comes from below the boundary of a spot, which it then leaves as if it were seen from outside, straight on.
-INLINE mask path_emerges(int bounce, const carried *with, const spot *here, world w) {
+// Whether a path comes from below the boundary of an interaction, which it then leaves as if it were seen from outside, straight on.
+INLINE mask path_emerges(int bounce, const path_state *with, const interaction *here, world w) {
     real body = set_body(w);
     body = pick(of_the_set(here->object, w), body, here->object);
     return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);

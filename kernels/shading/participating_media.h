@@ -1,7 +1,7 @@
 // Participating media beside the set, glass that scatters light: milk, jade, cloudy water. How far a flight
 // goes is in flights.h; the set's walks are in random_walk.h.
 //
-// No lamp is asked for: the boundary would bend the way to it. So the density of the direction is -1, and all light is met by chance.
+// No light is sampled: the boundary would bend the way to it. So the density of the direction is -1, and all light is met by chance.
 #define PURPOSE_TURN 0x10000u   // from the numbers of one scattering to those of the next
 
 // Brings a path to where it is scattered.
@@ -11,20 +11,20 @@ INLINE void path_flies(path *so_far, real way, mask here) {
 }
 
 // Whether nothing at all is in the way of a flight, as far as is known here: only the march knows where the set is.
-INLINE mask flight_is_free(const path *so_far, const carried *with, mask here, world w) {
+INLINE mask flight_is_free(const path *so_far, const path_state *with, mask here, world w) {
     here &= less(body_of(with->medium), set_body(w)) & less(with->flight, (real)(REAL_LARGEST));
     if (HAS(w, CLOUDS)) here &= ~here;   // they may be in the way, too
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};
     real number, far = with->flight;
     here &= less(with->flight, objects_met(&r, w.objects, w.planes, w.settings->object_count, w.tables, &number));
-    here &= ~lamp_met(r.origin, r.direction, 0, &far, w).met;
+    here &= ~light_hit_of(r.origin, r.direction, 0, &far, w).met;
     return here & ~ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
 }
 
 // Scatters paths that have flown to where they are now, and again as long as nothing but the medium is in their way: all of it counts
 // as one bounce. At the end their next flight is known.
-INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carried *with, mask here, world w) {
+INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, path_state *with, mask here, world w) {
     for (int turn = 0; turn < MOST_SCATTERINGS; ++turn) {
         if (turn > 0) {
             here &= flight_is_free(so_far, with, here, w);
@@ -46,7 +46,7 @@ INLINE void path_scatters(stage s, const packet_pixels *at, path *so_far, carrie
 }
 
 // Follows paths that an object's medium `scatters` on their way.
-INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, carried *with, mask scatters, world w) {
+INLINE void path_was_scattered(stage s, const packet_pixels *at, path *so_far, path_state *with, mask scatters, world w) {
     if (!any_lane(scatters)) return;
     with->density = pick(scatters, R(-1.0), with->density);
     path_flies(so_far, with->flight, scatters);

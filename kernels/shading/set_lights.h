@@ -1,4 +1,4 @@
-// Lights on the set: thousands of small balls. A place asks for one of them: SET_CHOICES are drawn by the probabilities of the grid's
+// Lights on the set: thousands of small balls. A place samples one of them: SET_CHOICES are drawn by the probabilities of the grid's
 // cell in which it lies, and one of these by what it could bring (resampled importance sampling, Talbot et al. 2005). Rays find
 // the balls that they meet in lists of a finer grid (Amanatides and Woo 1987). The host packs all this: `set_lights.py`.
 #define SET_CHOICES 8
@@ -189,7 +189,7 @@ INLINE int set_walk(const scalar *o, const scalar *d, int of_eye, scalar *far, w
 }
 
 // The nearest ball that rays meet before `far`, as `nearest_light` gives single lights. `density` is what the weights of both ways to find
-// it reckon with: that of a place which asks for this ball alone. Whatever they reckon with, they add up to 1 (Veach 1997, sec. 9.2).
+// it reckon with: that of a place which samples this ball alone. Whatever they reckon with, they add up to 1 (Veach 1997, sec. 9.2).
 CALLED mask set_met(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     scalar o[3][LANES], d[3][LANES], reach[LANES], found[LANES];
     vec_store(*origin, o);
@@ -216,8 +216,8 @@ INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *
     return set_met(&origin, &direction, of_eye, far, shows, density, weight, w);
 }
 
-// One ball's light at a spot, for shading by Phong's model: `shines` is its colour, and the strength what stands for all balls.
-CALLED void set_incidence(const spot *here, const packet_pixels *at, int number, int bounce, incidence *in, color *shines, mask *shadow, world w) {
+// One ball's light at an interaction, for shading by Phong's model: `shines` is its colour, and the strength what stands for all balls.
+CALLED void set_incidence(const interaction *here, const packet_pixels *at, int number, int bounce, incidence *in, color *shines, mask *shadow, world w) {
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, (uint)(PURPOSE_SET_LIGHT + 16 * bounce));
     real u, v, across, below, density;
     unit_square((bits)((uint)number), seed, &u, &v);

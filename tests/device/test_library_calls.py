@@ -29,7 +29,7 @@ from clfractal.voxels.lattice import EXTENT
 from tests.shell import environment
 
 KERNELS = (
-    *("begin_shots", "march_rays", "find_spots", "light_spots", "volume_medium", "cut_plane"),
+    *("begin_samples", "march_rays", "find_interactions", "light_interactions", "volume_medium", "cut_plane"),
     *("fill_bricks", "store_bricks", "classify_nodes", "classify_bricks", "seen_blocks"),
 )
 

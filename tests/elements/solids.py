@@ -100,10 +100,10 @@ def check_alone(
     scene = scenes.scene_of(
         NOWHERE, CAMERAS[camera], (48, 40), objects={"it": known.written}, background=[0, 0, 0]
     )
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     origin, direction, _ = rays(scene)
     t = known.met(origin, direction)
-    hit, right = film["A"] == 1, np.isfinite(t)
+    hit, right = framebuffer["A"] == 1, np.isfinite(t)
     # At a rim a ray may round to either side, or the march in NumPy not end.
     assert (hit != right).sum() <= 3
     both = hit & right
@@ -112,10 +112,12 @@ def check_alone(
     normal = normal_at(known.distance, points)
     facing = np.abs((normal * direction).sum(-1))[both]
     view = view_of(scene)
-    off = np.abs((points - view.origin) @ view.axis - film["Z"])[both]
+    off = np.abs((points - view.origin) @ view.axis - framebuffer["Z"])[both]
     assert (off * facing).max() < error
-    assert np.linalg.norm(points_of(film)[both] - points[both], axis=-1)[facing > 0.2].max() < 10 * error
-    turned = np.linalg.norm(normals_of(film)[both] - normal[both], axis=-1)
+    assert (
+        np.linalg.norm(points_of(framebuffer)[both] - points[both], axis=-1)[facing > 0.2].max() < 10 * error
+    )
+    turned = np.linalg.norm(normals_of(framebuffer)[both] - normal[both], axis=-1)
     # At an edge both faces are right.
     assert (turned > 1e-3).sum() <= 3 + 0.01 * both.sum()
 
@@ -124,11 +126,11 @@ def check_walls(known: Known, device: Device, eye: list[float]) -> None:
     """From inside its walls are seen."""
     camera = {"position": eye, "target": np.add(eye, [1, 1, 0.3]).tolist(), "fov": 100}
     scene = scenes.scene_of(NOWHERE, camera, (40, 32), objects={"it": known.written})
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     t = known.met(origin, direction)
-    assert (film["A"] == 1).all()
-    np.testing.assert_allclose(points_of(film), origin + t[..., None] * direction, atol=5e-5)
+    assert (framebuffer["A"] == 1).all()
+    np.testing.assert_allclose(points_of(framebuffer), origin + t[..., None] * direction, atol=5e-5)
 
 
 def check_opened(known: Known, device: Device) -> None:
@@ -147,7 +149,7 @@ def check_opened(known: Known, device: Device) -> None:
         objects={"it": known.written},
         cut_planes=[{**plane, "objects": ["it"]}],
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
 
     def left(points: Floats) -> Floats:
         found: Floats = np.maximum(known.distance(points), (points - known.position) @ normal)
@@ -155,13 +157,13 @@ def check_opened(known: Known, device: Device) -> None:
 
     origin, direction, _ = rays(scene)
     t = marched(left, origin, direction)
-    hit, right = film["A"] == 1, np.isfinite(t)
+    hit, right = framebuffer["A"] == 1, np.isfinite(t)
     assert (hit != right).sum() <= 3
     both = hit & right
     assert both.sum() > 60
-    off = np.linalg.norm(points_of(film) - origin - np.where(both, t, 0)[..., None] * direction, axis=-1)[
-        both
-    ]
+    off = np.linalg.norm(
+        points_of(framebuffer) - origin - np.where(both, t, 0)[..., None] * direction, axis=-1
+    )[both]
     assert np.percentile(off, 98) < 1e-4
 
 

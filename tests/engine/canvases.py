@@ -13,7 +13,7 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.engine.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
@@ -51,8 +51,8 @@ def drawn(job: Job, device: Device, canvas: Canvas | None = None) -> Canvas:
     canvas = canvas or Canvas(device)
     canvas.fit(job.views)
     executor, writer = LocalExecutor(device), CanvasKernels(device)
-    executor.outlet = lambda view, film, places, tiles: writer.place(
-        canvas, view, job.views[view].plan.region, film, places, tiles
+    executor.outlet = lambda view, framebuffer, places, tiles: writer.place(
+        canvas, view, job.views[view].plan.region, framebuffer, places, tiles
     )
     run(job, [CanvasStore(canvas, view, number) for number, view in enumerate(job.views)], executor)
     device.queue.finish()
@@ -96,9 +96,9 @@ def shown(
     return pixels[..., :3]
 
 
-def films_of(job: Job, pictures: Sequence[Mapping[str, Floats]]) -> JobFilms:
-    """Films with pictures of one's own."""
-    films = JobFilms(job)
-    for film, planes in zip(films.films, pictures, strict=True):
-        film.fill({name: planes[name] for name in film})
-    return films
+def framebuffers_of(job: Job, pictures: Sequence[Mapping[str, Floats]]) -> JobFramebuffers:
+    """Framebuffers with pictures of one's own."""
+    framebuffers = JobFramebuffers(job)
+    for framebuffer, planes in zip(framebuffers.framebuffers, pictures, strict=True):
+        framebuffer.fill({name: planes[name] for name in framebuffer})
+    return framebuffers

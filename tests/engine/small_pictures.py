@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 import clfractal
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.scenes import bulb_text
 
@@ -16,7 +16,7 @@ BULB = bulb_text(SIZE)
 VOLUME = BULB + "renderer: {type: volume, resolution: 32, value: coverage}\n"
 
 
-def equal(first: Film, second: Film) -> None:
+def equal(first: Framebuffer, second: Framebuffer) -> None:
     assert first.channels == second.channels
     for name in first.channels:
         np.testing.assert_array_equal(first[name], second[name], name)
@@ -36,5 +36,5 @@ output: {channels: [R, G, B, A, Z, N.X, P.Y, iterations, steps]}
 """
 
 
-def same(one: Film, other: Film) -> bool:
+def same(one: Framebuffer, other: Framebuffer) -> bool:
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)

@@ -1,4 +1,6 @@
-"""Pictures on the device have the bits of films, wherever their tiles come from and however often canvases change."""
+"""Pictures on the device have the bits of framebuffers, wherever their tiles come from and however often canvases
+change.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +14,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.engine.canvas import CHANNELS, Canvas, CanvasKernels, CanvasStore
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
 from clfractal.errors import DeviceError
@@ -29,15 +31,17 @@ def sized(width: int, height: int, *overrides: str) -> list[str]:
 
 
 def assert_as_films(canvas: Canvas, job: Job, device: Device) -> None:
-    films = JobFilms(job)
-    run(job, films.films, LocalExecutor(device))
+    framebuffers = JobFramebuffers(job)
+    run(job, framebuffers.framebuffers, LocalExecutor(device))
     depths, read = canvas.start_reading_depths(device.transfers)
     read.wait()
-    for number, film in enumerate(films.films):
+    for number, framebuffer in enumerate(framebuffers.framebuffers):
         found = canvas.read(device.transfers, number)
         for name in CHANNELS:
-            np.testing.assert_array_equal(found[name].view(np.uint32), film[name].view(np.uint32), name)
-        np.testing.assert_array_equal(depths[number], film["Z"])
+            np.testing.assert_array_equal(
+                found[name].view(np.uint32), framebuffer[name].view(np.uint32), name
+            )
+        np.testing.assert_array_equal(depths[number], framebuffer["Z"])
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -129,7 +133,9 @@ def test_a_part_of_a_picture_leaves_the_rest(region: Region, device: Device) -> 
     view = clipped(job.views[0], region)
     part = replace(job, views=(view,))
     writer, executor = CanvasKernels(device), LocalExecutor(device)
-    executor.outlet = lambda _, film, places, tiles: writer.place(canvas, 0, region, film, places, tiles)
+    executor.outlet = lambda _, framebuffer, places, tiles: writer.place(
+        canvas, 0, region, framebuffer, places, tiles
+    )
     run(part, [CanvasStore(canvas, view, 0)], executor)
     device.queue.finish()
     found = canvas.read(device.transfers, 0)

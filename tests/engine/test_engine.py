@@ -15,7 +15,7 @@ from clfractal.engine.drawing import Drawing
 from clfractal.engine.engine import Engine
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError, DeviceError, SceneError
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.voxels import fill
 from tests.calls import counted
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
@@ -114,17 +114,17 @@ def test_one_thread_at_a_time(device: Device) -> None:
             inside.set()
             thread.join(60)
 
-        film = engine.render(changed(BULB), wait)
-        assert film.done.all()
+        framebuffer = engine.render(changed(BULB), wait)
+        assert framebuffer.done.all()
         assert told == [
             "this engine is already in use; give each thread its own engine, or finish the refinement first"
         ]
         # And from one thread after the other as one likes.
-        found: list[Film] = []
+        found: list[Framebuffer] = []
         thread = threading.Thread(target=lambda: found.append(engine.render(changed(BULB))))
         thread.start()
         thread.join(120)
-        equal(found[0], film)
+        equal(found[0], framebuffer)
 
 
 def test_a_closed_engine_says_so(device: Device) -> None:
@@ -167,19 +167,23 @@ class TestRefinement:
         for overrides in ((), ("renderer.samples=6",), ("renderer.samples=16", "renderer.noise=0.05")):
             scene = changed(BULB, *overrides)
             with Engine(device) as engine:
-                films = list(engine.refine(scene))
+                framebuffers = list(engine.refine(scene))
                 whole = engine.render(scene)
-            equal(films[-1], whole)
-            assert films[-1].stage == ""
-            assert {film["R"].shape for film in films} == {whole["R"].shape}
-            assert [film.stage for film in films[:3]] == [f"every {n} pixel" for n in ("8th", "4th", "2nd")]
+            equal(framebuffers[-1], whole)
+            assert framebuffers[-1].stage == ""
+            assert {framebuffer["R"].shape for framebuffer in framebuffers} == {whole["R"].shape}
+            assert [framebuffer.stage for framebuffer in framebuffers[:3]] == [
+                f"every {n} pixel" for n in ("8th", "4th", "2nd")
+            ]
 
     def test_coarse_pictures_come_nearer(self, device: Device) -> None:
         with Engine(device) as engine:
-            films = list(engine.refine(changed(BULB, "image.width=160", "image.height=120")))
-        errors = [float(np.abs(film["A"] - films[-1]["A"]).mean()) for film in films]
+            framebuffers = list(engine.refine(changed(BULB, "image.width=160", "image.height=120")))
+        errors = [
+            float(np.abs(framebuffer["A"] - framebuffers[-1]["A"]).mean()) for framebuffer in framebuffers
+        ]
         assert errors[0] > errors[1] > errors[2] > errors[3] == 0
-        first = films[0]["A"]
+        first = framebuffers[0]["A"]
         blocks = first.reshape(15, 8, 20, 8)
         assert (blocks == blocks[:, :1, :, :1]).all()
 
@@ -195,8 +199,8 @@ class TestRefinement:
     def test_of_a_region(self, device: Device) -> None:
         scene, region = changed(BULB, "renderer.samples=2"), (13, 9, 40, 30)
         with Engine(device) as engine:
-            films = list(engine.refine(scene, region=region))
-            equal(films[-1], engine.render(scene, region=region))
+            framebuffers = list(engine.refine(scene, region=region))
+            equal(framebuffers[-1], engine.render(scene, region=region))
 
     def test_closing_one_frees_the_engine(self, device: Device) -> None:
         with Engine(device) as engine:
@@ -215,9 +219,9 @@ class TestRefinement:
         with Engine(device, tell=told.append) as engine:
             whole = engine.render(scene)
             monkeypatch.setattr(Drawing, "kept_bytes", lambda self, tiles: 1 << 60)
-            films = list(engine.refine(scene))
-        equal(films[-1], whole)
-        assert [film.stage for film in films[3:]] == [""]
+            framebuffers = list(engine.refine(scene))
+        equal(framebuffers[-1], whole)
+        assert [framebuffer.stage for framebuffer in framebuffers[3:]] == [""]
         assert len(told) == 1
         assert told[0].startswith("a picture in passes needs ")
         assert told[0].endswith("; so all samples are made in one pass")
@@ -229,13 +233,13 @@ class TestRefinement:
         shown: list[str] = []
 
         class Handle:
-            def update(self, film: Film) -> None:
-                shown.append(film.stage)
+            def update(self, framebuffer: Framebuffer) -> None:
+                shown.append(framebuffer.stage)
 
-        def display(film: Film, *, display_id: bool) -> Handle:
+        def display(framebuffer: Framebuffer, *, display_id: bool) -> Handle:
             assert display_id
-            assert film._repr_png_() is not None
-            shown.append(film.stage)
+            assert framebuffer._repr_png_() is not None
+            shown.append(framebuffer.stage)
             return Handle()
 
         module = types.ModuleType("IPython.display")
@@ -252,7 +256,7 @@ class TestRefinement:
         monkeypatch.setattr(local, "_WORTH_TELLING", 1 << 10)
         with Engine(device, tell=told.append) as engine:
             list(engine.refine(changed(BULB, "renderer.samples=2", "output.channels=[R, G, B]")))
-        # Three colours and the number of shots, of 2 x 2 tiles.
+        # Three colours and the number of samples, of 2 x 2 tiles.
         assert told == ["a picture in passes needs 0.1 MiB of device memory"]
 
 

@@ -26,7 +26,7 @@ from clfractal.engine.several import SeveralExecutor
 from clfractal.engine.sharing import Shared
 from clfractal.errors import DeviceError
 from clfractal.files.exr import read_exr
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
@@ -92,7 +92,7 @@ def hanging(engine: Engine, *hangs: Hang) -> SeveralExecutor:
 
 
 @pytest.fixture(scope="module")
-def whole(device: Device) -> Film:
+def whole(device: Device) -> Framebuffer:
     with Engine(device) as engine:
         return engine.render(SCENE)
 
@@ -106,17 +106,17 @@ def hang(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hang]:
     found.freed.set()
 
 
-def test_a_hung_device_is_left_out(device: Device, whole: Film, hang: Hang) -> None:
+def test_a_hung_device_is_left_out(device: Device, whole: Framebuffer, hang: Hang) -> None:
     said: list[str] = []
     with Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
         shared = hanging(engine, hang)
-        film = engine.render(SCENE)
-        assert same(film, whole)
+        framebuffer = engine.render(SCENE)
+        assert same(framebuffer, whole)
         assert list(shared.failures) == [0]
         line = f"{halves_of(device)}#1 {device.info.name} is left out, others do its work: "
         line += f"{device.info.name}: the device has not answered for "
         assert [each for each in said if each.startswith(line)]
-        assert [each for each in film.remarks if each.startswith(line)]
+        assert [each for each in framebuffer.remarks if each.startswith(line)]
         assert not hang.ended.is_set()
         again = engine.render(SCENE)
         assert same(again, whole)
@@ -124,7 +124,7 @@ def test_a_hung_device_is_left_out(device: Device, whole: Film, hang: Hang) -> N
 
 
 def test_a_device_that_comes_back_late_does_no_harm(
-    device: Device, whole: Film, hang: Hang, monkeypatch: pytest.MonkeyPatch
+    device: Device, whole: Framebuffer, hang: Hang, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It comes back while the other one still has its tiles to do."""
     execute = LocalExecutor.execute
@@ -144,12 +144,12 @@ def test_a_device_that_comes_back_late_does_no_harm(
 
     with Engine(halves_of(device), budget_seconds=0.01, tell=tell) as engine:
         shared = hanging(engine, hang)
-        film = engine.render(SCENE)
+        framebuffer = engine.render(SCENE)
         assert late == [True]
-        assert same(film, whole)
-        assert film.done.all()
-        assert sum(each["tiles"] for each in film.stats["devices"]) == film.grid.count
-        assert film.stats["rays"] == whole.stats["rays"]
+        assert same(framebuffer, whole)
+        assert framebuffer.done.all()
+        assert sum(each["tiles"] for each in framebuffer.stats["devices"]) == framebuffer.grid.count
+        assert framebuffer.stats["rays"] == whole.stats["rays"]
         assert list(shared.failures) == [0]
         assert same(engine.render(SCENE), whole)
 
@@ -163,22 +163,22 @@ def test_all_devices_hang(device: Device, hang: Hang) -> None:
         assert caught.value.status == 3
 
 
-def test_passes_of_a_hung_device_begin_again(device: Device, whole: Film, hang: Hang) -> None:
+def test_passes_of_a_hung_device_begin_again(device: Device, whole: Framebuffer, hang: Hang) -> None:
     """It hangs when it has some samples of tiles, which nobody else has."""
     with Engine(halves_of(device), budget_seconds=0.01) as engine:
         shared = hanging(engine, hang)
         hang.after = 10_000
         hang.began.set()
-        films = []
-        for film in engine.refine(SCENE):
-            films.append(film)
-            if film.stage.startswith("2 of"):
+        framebuffers = []
+        for framebuffer in engine.refine(SCENE):
+            framebuffers.append(framebuffer)
+            if framebuffer.stage.startswith("2 of"):
                 hang.after = 1
-        assert same(films[-1], whole)
+        assert same(framebuffers[-1], whole)
         assert list(shared.failures) == [0]
 
 
-def test_a_device_that_does_not_end_is_left_out(device: Device, whole: Film, hang: Hang) -> None:
+def test_a_device_that_does_not_end_is_left_out(device: Device, whole: Framebuffer, hang: Hang) -> None:
     """The caller stops; the hung device is waited for no longer than usual, and used no more."""
     with Engine(halves_of(device), budget_seconds=0.01) as engine:
         shared = hanging(engine, hang)
@@ -274,7 +274,7 @@ def started(folder: Path, patience: float, *options: str) -> subprocess.Popen[st
     )
 
 
-def test_the_program_ends_although_a_thread_hangs(whole: Film, tmp_path: Path) -> None:
+def test_the_program_ends_although_a_thread_hangs(whole: Framebuffer, tmp_path: Path) -> None:
     running = started(tmp_path, 1.0)
     _, told = running.communicate(timeout=60)
     assert running.returncode == 0, told

@@ -17,7 +17,7 @@ from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.refine import pass_ranges
 from clfractal.engine.run import Progress, run
 from clfractal.errors import Stopped
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.plan import Plan
 from clfractal.scene.model import Scene
 from tests.render.passes import RENDERERS, SIZE, scene_with
@@ -57,15 +57,15 @@ class Interrupted:
         self.random = np.random.default_rng(seed)
         self.stops = 0
 
-    def film(self, ranges: list[tuple[int, int]], tries: int) -> Film:
+    def framebuffer(self, ranges: list[tuple[int, int]], tries: int) -> Framebuffer:
         """The picture; each pass is tried so many times until it may be finished."""
         for samples in ranges:
             for _ in range(tries):
                 self.try_once(samples)
             self.attempt(Impatient(int(self.random.integers(0, 3))), samples)
-            film = Film(self.plan.channels, self.size, self.plan.region)
-            run(self.job, [film], self.executor, samples=samples)
-        return film
+            framebuffer = Framebuffer(self.plan.channels, self.size, self.plan.region)
+            run(self.job, [framebuffer], self.executor, samples=samples)
+        return framebuffer
 
     def try_once(self, samples: tuple[int, int]) -> None:
         """A pass that is told to end after a random number of launches, or at a random time within one."""
@@ -89,14 +89,14 @@ class Interrupted:
     def attempt(
         self, token: CancelToken, samples: tuple[int, int], progress: Callable[[Progress], None] | None = None
     ) -> None:
-        film = Film(self.plan.channels, self.size, self.plan.region)
+        framebuffer = Framebuffer(self.plan.channels, self.size, self.plan.region)
         try:
-            run(self.job, [film], self.executor, token=token, samples=samples, progress=progress)
+            run(self.job, [framebuffer], self.executor, token=token, samples=samples, progress=progress)
         except Stopped:
             self.stops += 1
 
 
-def same_bits(found: Film, wanted: Film) -> None:
+def same_bits(found: Framebuffer, wanted: Framebuffer) -> None:
     np.testing.assert_array_equal(stacked(found).view(np.uint32), stacked(wanted).view(np.uint32))
 
 
@@ -110,8 +110,8 @@ def test_an_interrupted_pass_done_anew(kind: str, adaptive: bool, budget: float,
     plan = plan_of(scene, device)
     wanted = shoot(scene, device)
     work = Interrupted(scene, plan, device, LocalExecutor(device, budget_seconds=budget), seed=len(kind))
-    same_bits(work.film(pass_ranges(16), tries=4), wanted)
-    same_bits(work.film([(0, 5), (5, 16)], tries=4), wanted)
+    same_bits(work.framebuffer(pass_ranges(16), tries=4), wanted)
+    same_bits(work.framebuffer([(0, 5), (5, 16)], tries=4), wanted)
     assert work.stops > 0
 
 
@@ -120,7 +120,7 @@ def test_in_float64(kind: str, device: Device) -> None:
     precision: Precision = "float64"
     scene = scene_with(kind, **NOISY)
     work = Interrupted(scene, plan_of(scene, device, precision), device, LocalExecutor(device), seed=1)
-    same_bits(work.film(pass_ranges(16), tries=5), shoot(scene, device, precision))
+    same_bits(work.framebuffer(pass_ranges(16), tries=5), shoot(scene, device, precision))
     assert work.stops > 0
 
 
@@ -130,11 +130,13 @@ def test_with_any_number_of_lanes(lanes: int, device: Device) -> None:
     """Lanes of one packet that have different numbers of samples, because some of their pixels are done."""
     scene = scene_with("surface", **NOISY)
     plan = plan_of(scene, device, lanes=lanes)
-    whole = Film(plan.channels, SIZE, plan.region)
+    whole = Framebuffer(plan.channels, SIZE, plan.region)
     run(job_of(scene, plan, device), [whole], LocalExecutor(device))
     assert len(np.unique(whole["samples"])) > 1
     executor = LocalExecutor(device, budget_seconds=1e-4)
-    same_bits(Interrupted(scene, plan, device, executor, seed=lanes).film(pass_ranges(16), tries=4), whole)
+    same_bits(
+        Interrupted(scene, plan, device, executor, seed=lanes).framebuffer(pass_ranges(16), tries=4), whole
+    )
 
 
 def test_a_pass_within_a_heavy_tile(device: Device) -> None:
@@ -150,15 +152,15 @@ def test_a_pass_within_a_heavy_tile(device: Device) -> None:
             timer = threading.Timer(wait, token.cancel)
             timer.start()
             try:
-                film = Film(plan.channels, (64, 64), plan.region)
-                run(job, [film], executor, token=token, samples=samples)
+                framebuffer = Framebuffer(plan.channels, (64, 64), plan.region)
+                run(job, [framebuffer], executor, token=token, samples=samples)
             except Stopped:
                 stops += 1
             timer.join()
-        film = Film(plan.channels, (64, 64), plan.region)
-        run(job, [film], executor, samples=samples)
+        framebuffer = Framebuffer(plan.channels, (64, 64), plan.region)
+        run(job, [framebuffer], executor, samples=samples)
     assert stops >= 4
-    same_bits(film, wanted)
+    same_bits(framebuffer, wanted)
 
 
 def test_a_pass_that_was_finished_can_be_done_again(device: Device) -> None:
@@ -167,9 +169,9 @@ def test_a_pass_that_was_finished_can_be_done_again(device: Device) -> None:
     plan = plan_of(scene, device)
     executor = LocalExecutor(device)
     for samples in ((0, 1), (0, 1), (1, 4), (1, 4), (1, 4), (4, 16), (4, 16)):
-        film = Film(plan.channels, SIZE, plan.region)
-        run(job_of(scene, plan, device), [film], executor, samples=samples)
-    same_bits(film, shoot(scene, device))
+        framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+        run(job_of(scene, plan, device), [framebuffer], executor, samples=samples)
+    same_bits(framebuffer, shoot(scene, device))
 
 
 def test_an_interrupted_whole_picture(device: Device) -> None:
@@ -182,11 +184,11 @@ def test_an_interrupted_whole_picture(device: Device) -> None:
         token = CancelToken()
         threading.Timer(wait, token.cancel).start()
         with pytest.raises(Stopped):
-            run(job, [Film(plan.channels, SIZE, plan.region)], executor, token=token, samples=(0, 16))
+            run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, token=token, samples=(0, 16))
         time.sleep(wait)
-    film = Film(plan.channels, SIZE, plan.region)
-    run(job, [film], executor, samples=(0, 16))
-    same_bits(film, shoot(scene, device))
+    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+    run(job, [framebuffer], executor, samples=(0, 16))
+    same_bits(framebuffer, shoot(scene, device))
 
 
 def test_what_was_kept_goes_with_a_view_that_could_not_be_taken(device: Device) -> None:
@@ -196,13 +198,13 @@ def test_what_was_kept_goes_with_a_view_that_could_not_be_taken(device: Device) 
     executor = LocalExecutor(device)
     job = job_of(scene, plan, device)
     assert not executor.keeps(1)
-    run(job, [Film(plan.channels, SIZE, plan.region)], executor, samples=(0, 1))
+    run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(0, 1))
     assert executor.keeps(1)
     assert not executor.keeps(2)
     executor.kept = type(executor.kept)()
     token = CancelToken()
     token.cancel()
     with pytest.raises(Stopped):
-        run(job, [Film(plan.channels, SIZE, plan.region)], executor, samples=(1, 2), token=token)
+        run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(1, 2), token=token)
     assert not executor.keeps(1)
     executor.forget()

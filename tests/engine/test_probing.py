@@ -15,7 +15,7 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.engine.engine import Engine
 from clfractal.engine.prepare import with_size
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.probe import CHANNELS, Probe
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL, BALL_RADIUS, engine_of
@@ -89,8 +89,8 @@ def test_films_tell_the_same(engine: Engine) -> None:
     with pytest.raises(clfractal.SceneError, match=r"^y: must be a whole number, got 2\.5$"):
         part.probe(40, 2.5)  # type: ignore[arg-type]
     assert part.probe(np.int64(40), np.int32(21)) == expected  # type: ignore[arg-type]
-    with pytest.raises(clfractal.SceneError, match="only films that were rendered"):
-        Film().probe(0, 0)
+    with pytest.raises(clfractal.SceneError, match="only framebuffers that were rendered"):
+        Framebuffer().probe(0, 0)
 
 
 def test_the_depth_makes_the_point_sharp(engine: Engine) -> None:

@@ -15,10 +15,10 @@ from clfractal.device.select import Device
 from clfractal.engine.engine import Engine
 from clfractal.engine.run import Progress
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from tests.pictures import scene_paths, small_films
+from tests.pictures import scene_paths, small_framebuffers
 from tests.render.shots import BALL, engine_of
 from tests.scenes import scene_of
 from tests.shell import Ended, InProcess
@@ -52,10 +52,10 @@ def one(remarks: tuple[str, ...], *parts: str) -> None:
 
 
 def test_a_usual_picture_needs_no_remark(engine: Engine) -> None:
-    film = engine.render(scene_of(BALL, CAMERA, SIZE))
-    assert film.remarks == ()
-    assert film.stats["remarks"] == []
-    assert Film().remarks == ()
+    framebuffer = engine.render(scene_of(BALL, CAMERA, SIZE))
+    assert framebuffer.remarks == ()
+    assert framebuffer.stats["remarks"] == []
+    assert Framebuffer().remarks == ()
 
 
 def test_a_key_without_an_effect(engine: Engine) -> None:
@@ -68,7 +68,9 @@ def test_a_key_without_an_effect(engine: Engine) -> None:
 @pytest.mark.parametrize("name", ["mandelbulb", "cut_mandelbrot", "four_views", "stereo_hall"])
 def test_shipped_scenes_need_none(name: str) -> None:
     (path,) = [path for path in scene_paths() if path.stem == name]
-    assert [film.remarks for film in small_films(path)] == [()] * len(small_films(path))
+    assert [framebuffer.remarks for framebuffer in small_framebuffers(path)] == [()] * len(
+        small_framebuffers(path)
+    )
 
 
 def test_no_ray_meets_the_set(engine: Engine) -> None:
@@ -94,9 +96,9 @@ def test_channels_are_not_needed(channels: list[str], engine: Engine) -> None:
 def test_a_region_may_show_only_background(engine: Engine) -> None:
     """But not if the whole picture misses the set."""
     corner = (0, 0, 8, 8)
-    film = engine.render(scene_of(BALL, CAMERA, SIZE), region=corner)
-    assert film.stats["hits"] == 0
-    assert film.remarks == ()
+    framebuffer = engine.render(scene_of(BALL, CAMERA, SIZE), region=corner)
+    assert framebuffer.stats["hits"] == 0
+    assert framebuffer.remarks == ()
     one(engine.render(scene_of(BALL, AWAY, SIZE), region=corner).remarks, "no ray meets the set")
 
 
@@ -205,9 +207,9 @@ def test_a_picture_made_again_has_the_same_remarks(engine: Engine, tmp_path: Pat
         "camera: {position: [1.7, -2.9, 1.4]}\nlighting: {mode: path}\nlights: []\nbackground: [1, 1, 1]\n"
         "materials: {m: {base: {color: [1, 1, 1]}}}\nmaterial: {name: m}\nrenderer: {samples: 4}\n"
     )
-    film = engine.render(scene)
-    assert film.remarks == ()
-    film.save(tmp_path / "a.png")
+    framebuffer = engine.render(scene)
+    assert framebuffer.remarks == ()
+    framebuffer.save(tmp_path / "a.png")
     assert engine.render(tmp_path / "a.png").remarks == ()
     shiny = scene.model_copy(update={"material": {"name": "m", "shininess": 50}})
     for source in (shiny, shiny.resolved()):
@@ -216,15 +218,15 @@ def test_a_picture_made_again_has_the_same_remarks(engine: Engine, tmp_path: Pat
 
 def test_refined_pictures_have_them_at_the_end(engine: Engine) -> None:
     adaptive = {"type": "surface", "samples": 8, "noise": 1.0, "min_samples": 4}
-    films = list(engine.refine(scene_of(BALL, CAMERA, SIZE, renderer=adaptive)))
-    assert films[-1].remarks == ()
-    films = list(engine.refine(scene_of(BALL, AWAY, SIZE)))
-    one(films[-1].remarks, "no ray meets the set")
+    framebuffers = list(engine.refine(scene_of(BALL, CAMERA, SIZE, renderer=adaptive)))
+    assert framebuffers[-1].remarks == ()
+    framebuffers = list(engine.refine(scene_of(BALL, AWAY, SIZE)))
+    one(framebuffers[-1].remarks, "no ray meets the set")
 
 
 def test_they_travel_with_the_film(engine: Engine) -> None:
-    film = engine.render(scene_of(BALL, AWAY, SIZE))
-    assert pickle.loads(pickle.dumps(film)).remarks == film.remarks != ()
+    framebuffer = engine.render(scene_of(BALL, AWAY, SIZE))
+    assert pickle.loads(pickle.dumps(framebuffer)).remarks == framebuffer.remarks != ()
 
 
 SHELL_SCENE = """version: 1

@@ -13,7 +13,7 @@ from clfractal.camera.views import seen_by
 from clfractal.device.select import Device
 from clfractal.engine.engine import Engine
 from clfractal.engine.settle import HIGHLIGHT, exposure_of, is_settled
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
@@ -128,16 +128,16 @@ def test_both_eyes_have_the_focus_of_the_eye_between_them(engine: Engine) -> Non
 def test_regions_and_headers_give_the_same_bits(engine: Engine) -> None:
     """Of the scene, of a part of it, and of the scene in the picture's header, which has numbers."""
     scene = ball("output.exposure=auto", focus_on=[0.4, 0.4])
-    film = engine.render(scene, samples=2)
+    framebuffer = engine.render(scene, samples=2)
     part = engine.render(scene, samples=2, region=(30, 20, 20, 10))
-    again = engine.render(load_scene(film.header["scene"]), samples=2)
+    again = engine.render(load_scene(framebuffer.header["scene"]), samples=2)
     for name in "RGBZ":
-        np.testing.assert_array_equal(part[name], film[name][20:30, 30:50])
-        np.testing.assert_array_equal(again[name], film[name])
-    header = load_scene(film.header["scene"])
+        np.testing.assert_array_equal(part[name], framebuffer[name][20:30, 30:50])
+        np.testing.assert_array_equal(again[name], framebuffer[name])
+    header = load_scene(framebuffer.header["scene"])
     assert is_settled(header)
-    assert header.output.exposure == film.header["exposure"] == part.header["exposure"]
-    assert again.header["scene"] == film.header["scene"]
+    assert header.output.exposure == framebuffer.header["exposure"] == part.header["exposure"]
+    assert again.header["scene"] == framebuffer.header["scene"]
 
 
 def lit(intensity: float, **sections: Any) -> Scene:
@@ -160,29 +160,29 @@ def test_twice_the_light_needs_a_stop_less(engine: Engine) -> None:
 
 
 def test_the_brightest_hundredth_begins_near_white(engine: Engine) -> None:
-    film = engine.render(lit(0.3))
-    seen = film["A"] > 0.5
+    framebuffer = engine.render(lit(0.3))
+    seen = framebuffer["A"] > 0.5
     assert seen.mean() > 0.05
-    bright = 0.2126 * film["R"] + 0.7152 * film["G"] + 0.0722 * film["B"]
-    shown = bright[seen] * 2.0 ** film.header["exposure"]
+    bright = 0.2126 * framebuffer["R"] + 0.7152 * framebuffer["G"] + 0.0722 * framebuffer["B"]
+    shown = bright[seen] * 2.0 ** framebuffer.header["exposure"]
     assert float(np.quantile(shown, 0.99)) == pytest.approx(HIGHLIGHT, rel=0.03)
 
 
-def film_of(bright: Any) -> Film:
-    """A film of one row, grey, wholly covered."""
+def framebuffer_of(bright: Any) -> Framebuffer:
+    """A framebuffer of one row, grey, wholly covered."""
     row = np.asarray(bright, np.float32)[None]
-    film = Film("RGBA", (row.shape[1], 1))
-    film.fill({"R": row, "G": row, "B": row, "A": np.ones_like(row)})
-    return film
+    framebuffer = Framebuffer("RGBA", (row.shape[1], 1))
+    framebuffer.fill({"R": row, "G": row, "B": row, "A": np.ones_like(row)})
+    return framebuffer
 
 
 def test_sparks_do_not_darken_the_rest() -> None:
     """Three of a hundred pixels are ten thousand times as bright: the rest stays visible."""
     bright = np.full(100, 0.1)
     bright[:3] = 1000.0
-    stops = exposure_of([film_of(bright)])
+    stops = exposure_of([framebuffer_of(bright)])
     mean = math.exp((97 * math.log(0.1) + 3 * math.log(1000)) / 100)
     assert stops == pytest.approx(math.log2(0.045 / mean), abs=0.006)
     assert 0.1 * 2**stops > 0.02
-    assert exposure_of([film_of(np.zeros(9))]) == 0
-    assert exposure_of([film_of([0.75, np.inf, np.nan])]) == pytest.approx(0, abs=0.006)
+    assert exposure_of([framebuffer_of(np.zeros(9))]) == 0
+    assert exposure_of([framebuffer_of([0.75, np.inf, np.nan])]) == pytest.approx(0, abs=0.006)

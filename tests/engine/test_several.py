@@ -23,7 +23,7 @@ from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Result, WorkItem
 from clfractal.engine.several import SeveralExecutor
 from clfractal.errors import DeviceError, Stopped
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import lanes
 from clfractal.integrators.lanes import march_reports
 from clfractal.scene.load import load_scene
@@ -62,33 +62,33 @@ def failing(engine: Engine, which: Sequence[int], after: int) -> SeveralExecutor
 
 
 @pytest.fixture(scope="module")
-def whole(device: Device) -> Film:
+def whole(device: Device) -> Framebuffer:
     with Engine(device) as engine:
         return engine.render(SCENE)
 
 
-def test_halves_give_the_bits_of_the_whole(device: Device, whole: Film) -> None:
+def test_halves_give_the_bits_of_the_whole(device: Device, whole: Framebuffer) -> None:
     with Engine(halves_of(device), budget_seconds=0.01) as engine:
         assert same(engine.render(SCENE), whole)
-        film = engine.render(SCENE)
-    assert same(film, whole)
-    shares = film.stats["devices"]
+        framebuffer = engine.render(SCENE)
+    assert same(framebuffer, whole)
+    shares = framebuffer.stats["devices"]
     assert [each["index"] for each in shares] == [f"{halves_of(device)}#{number}" for number in (1, 2)]
     assert sum(each["tiles"] for each in shares) == TILES
     assert all(each["tiles"] > TILES / 5 for each in shares)
-    assert sum(each["rays"] for each in shares) == film.stats["rays"] == whole.stats["rays"]
-    assert film.remarks == whole.remarks
+    assert sum(each["rays"] for each in shares) == framebuffer.stats["rays"] == whole.stats["rays"]
+    assert framebuffer.remarks == whole.remarks
     # The header tells the same, tile by tile.
-    lines = film.header["devices"].split("\n")
+    lines = framebuffer.header["devices"].split("\n")
     told = {each["index"]: f"{each['index']} {each['device']}: {each['tiles']} tiles" for each in shares}
     assert sorted(line.partition(": ")[2] for line in lines) == sorted(told.values())
-    runs = [tuple(map(int, run.split("*"))) for run in film.header["tileDevices"].split()]
+    runs = [tuple(map(int, run.split("*"))) for run in framebuffer.header["tileDevices"].split()]
     counts = {number: sum(length for length, own in runs if own == number) for number in (1, 2)}
     assert {f"{number}: " for number in counts} == {line[:3] for line in lines}
     assert all(f": {counts[int(line[0])]} tiles" in line for line in lines)
 
 
-def test_one_device_tells_of_no_others(whole: Film) -> None:
+def test_one_device_tells_of_no_others(whole: Framebuffer) -> None:
     assert not {"devices", "tileDevices"} & set(whole.header)
     assert "devices" not in whole.stats
 
@@ -117,24 +117,25 @@ def test_a_stereo_pair(device: Device) -> None:
     stereo = SCENE.replace("width: 300, height: 200", "width: 130, height: 100")
     stereo += "stereo: {mode: anaglyph, separation: 0.1}\n"
     with Engine(device) as one, Engine(halves_of(device), budget_seconds=0.01) as two:
-        film = two.render(stereo)
-        assert same(film, one.render(stereo))
+        framebuffer = two.render(stereo)
+        assert same(framebuffer, one.render(stereo))
     assert (
-        sum(int(line.split(": ")[2].split()[0]) for line in film.header["devices"].split("\n")) == 2 * 5 * 4
+        sum(int(line.split(": ")[2].split()[0]) for line in framebuffer.header["devices"].split("\n"))
+        == 2 * 5 * 4
     )
 
 
 @pytest.mark.parametrize("after", [1, 20])
-def test_a_device_that_fails_is_left_out(device: Device, whole: Film, after: int) -> None:
+def test_a_device_that_fails_is_left_out(device: Device, whole: Framebuffer, after: int) -> None:
     said: list[str] = []
     with Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
         shared = failing(engine, [0], after)
-        film = engine.render(SCENE)
-        assert same(film, whole)
+        framebuffer = engine.render(SCENE)
+        assert same(framebuffer, whole)
         assert list(shared.failures) == [0]
         line = f"{halves_of(device)}#1 {device.info.name} is left out, others do its work: {device.info.name}: the"
         assert [each for each in said if each.startswith(line)]
-        assert [each for each in film.remarks if each.startswith(line)]
+        assert [each for each in framebuffer.remarks if each.startswith(line)]
         # It stays so, and decisions are made for another.
         again = engine.render(SCENE)
         assert same(again, whole)
@@ -153,7 +154,7 @@ def test_no_device_is_left(device: Device) -> None:
 
 
 def test_a_device_that_does_not_work_at_all(
-    device: Device, whole: Film, monkeypatch: pytest.MonkeyPatch
+    device: Device, whole: Framebuffer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It fails where decisions are made, before anything is rendered."""
     real = lanes.best_lanes
@@ -170,14 +171,14 @@ def test_a_device_that_does_not_work_at_all(
 
 
 @pytest.mark.parametrize("after", [10_000, 75, 150])
-def test_passes_stay_on_their_device(device: Device, whole: Film, after: int) -> None:
+def test_passes_stay_on_their_device(device: Device, whole: Framebuffer, after: int) -> None:
     """Samples are added on the device that has the earlier ones; with it they are lost, and the tile begins again."""
     with Engine(halves_of(device), budget_seconds=0.01) as engine:
         failing(engine, [1], after)
-        films = list(engine.refine(SCENE))
-        assert same(films[-1], whole)
-        assert films[-1].stage == ""
-        assert len(films) == 3 + 4  # every 8th, 4th, 2nd pixel; 1, 2, 4 and 5 samples
+        framebuffers = list(engine.refine(SCENE))
+        assert same(framebuffers[-1], whole)
+        assert framebuffers[-1].stage == ""
+        assert len(framebuffers) == 3 + 4  # every 8th, 4th, 2nd pixel; 1, 2, 4 and 5 samples
 
 
 def test_devices_of_another_kind_use_their_own_lanes(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,25 +214,25 @@ def test_two_implementations(device: Device) -> None:
         alone = one.render(scene)
     with Engine(names, budget_seconds=0.01) as both:
         for _ in range(5):  # a short picture does not wait for the programs of the second
-            film = both.render(scene)
-            if len(film.stats["devices"]) == 2:
+            framebuffer = both.render(scene)
+            if len(framebuffer.stats["devices"]) == 2:
                 break
-    assert [each["index"] for each in film.stats["devices"]] == sorted(names)
-    assert [remark for remark in film.remarks if remark.startswith("made by devices of 2 kinds")]
-    order = [*"RGBA", *(name for name in film if name not in "RGBA")]
-    pictures = [np.stack([picture[name] for name in order]) for picture in (alone, film)]
+    assert [each["index"] for each in framebuffer.stats["devices"]] == sorted(names)
+    assert [remark for remark in framebuffer.remarks if remark.startswith("made by devices of 2 kinds")]
+    order = [*"RGBA", *(name for name in framebuffer if name not in "RGBA")]
+    pictures = [np.stack([picture[name] for name in order]) for picture in (alone, framebuffer)]
     assert not difference(pictures[0], pictures[1], "float32").fault
 
 
-def test_float64_is_left_to_those_that_have_it(device: Device, whole: Film) -> None:
+def test_float64_is_left_to_those_that_have_it(device: Device, whole: Framebuffer) -> None:
     halves_of(device)
     parts = device.divided((1, 1))
     lacking = Device(replace(parts[0].info, driver="without", has_float64=False), parts[0].cl_device)
     said: list[str] = []
     with Engine([lacking, parts[1]], tell=said.append) as engine:
         assert engine.device is parts[1]
-        film = engine.render(SCENE, precision="float64", samples=1)
-    assert [each["index"] for each in film.stats["devices"]] == [parts[1].info.index]
+        framebuffer = engine.render(SCENE, precision="float64", samples=1)
+    assert [each["index"] for each in framebuffer.stats["devices"]] == [parts[1].info.index]
     assert f"{lacking.info.index} {lacking.info.name} has no float64, so others do its work" in said
 
 
@@ -276,8 +277,8 @@ def test_a_program_is_compiled_once_for_devices_of_one_kind(
     with Engine(halves_of(device)) as engine:
         for executor in engine.executor.executors:  # type: ignore[union-attr]
             executor.device.loaded.clear()
-        film = engine.render(scene, samples=1)
-    assert len(film.stats["devices"]) == 2
+        framebuffer = engine.render(scene, samples=1)
+    assert len(framebuffer.stats["devices"]) == 2
     assert len(compiled) == len(set(compiled)) > 0
 
 
@@ -290,7 +291,7 @@ def test_pictures_whose_samples_differ_are_shared(device: Device) -> None:
         alone = one.render(scene, samples=4)
     with Engine(halves_of(device)) as both:
         both.render(scene, samples=4)
-        film = both.render(scene, samples=4)
-    assert len(film.stats["devices"]) == 2
+        framebuffer = both.render(scene, samples=4)
+    assert len(framebuffer.stats["devices"]) == 2
     for name in alone:
-        np.testing.assert_array_equal(film[name], alone[name], name)
+        np.testing.assert_array_equal(framebuffer[name], alone[name], name)

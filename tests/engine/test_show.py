@@ -13,7 +13,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.engine.canvas import CHANNELS, Canvas
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
 from clfractal.engine.show import Arrangement, Look, Shower, can_reduce
@@ -23,7 +23,7 @@ from clfractal.files.tone_names import TONES, Tone
 from clfractal.images.outputs import png_bytes
 from clfractal.images.tiled import Floats
 from clfractal.scene.stereo import APART, Stereo
-from tests.engine.canvases import LAYOUT, drawn, films_of, job_of, look_of, painted, scene_of, shown
+from tests.engine.canvases import LAYOUT, drawn, framebuffers_of, job_of, look_of, painted, scene_of, shown
 from tests.scenes import STEREO
 
 COMPOSED = (
@@ -77,11 +77,11 @@ def shower(device: Device) -> Shower:
     return Shower(device)
 
 
-def file_pixels(films: JobFilms) -> npt.NDArray[np.uint8]:
+def file_pixels(framebuffers: JobFramebuffers) -> npt.NDArray[np.uint8]:
     """What a PNG has."""
     from PIL import Image
 
-    return np.asarray(Image.open(io.BytesIO(png_bytes(films.picture()))).convert("RGB"))
+    return np.asarray(Image.open(io.BytesIO(png_bytes(framebuffers.picture()))).convert("RGB"))
 
 
 def assert_same(found: npt.NDArray[np.uint8], wanted: npt.NDArray[np.uint8], device: Device) -> None:
@@ -98,21 +98,23 @@ def assert_same(found: npt.NDArray[np.uint8], wanted: npt.NDArray[np.uint8], dev
 def test_a_window_shows_what_the_file_has(name: str, device: Device, shower: Shower) -> None:
     scene = scene_of(*CASES[name])
     job = job_of(scene, device)
-    films = JobFilms(job)
-    run(job, films.films, LocalExecutor(device))
+    framebuffers = JobFramebuffers(job)
+    run(job, framebuffers.framebuffers, LocalExecutor(device))
     found = shown(drawn(job, device), Arrangement.of(job), look_of(scene), shower)
     assert found.std() > 5
-    assert_same(found, file_pixels(films), device)
+    assert_same(found, file_pixels(framebuffers), device)
 
 
 @pytest.mark.parametrize("mode", [mode for mode in COMPOSED if not mode.endswith("half")])
 def test_a_pair_is_shown_in_every_mode_without_new_rays(mode: str, device: Device, shower: Shower) -> None:
     """A job whose eyes stay apart is what a window renders; full-size modes are made of it."""
     pair, single = (job_of(scene_of(STEREO, f"stereo.mode={m}"), device) for m in ("pair", mode))
-    films = JobFilms(single)
-    run(single, films.films, LocalExecutor(device))
+    framebuffers = JobFramebuffers(single)
+    run(single, framebuffers.framebuffers, LocalExecutor(device))
     look = look_of(single.scene)
-    assert_same(shown(drawn(pair, device), Arrangement.of(pair), look, shower), file_pixels(films), device)
+    assert_same(
+        shown(drawn(pair, device), Arrangement.of(pair), look, shower), file_pixels(framebuffers), device
+    )
 
 
 def noise(job: Job, seed: int, span: float = 6) -> list[dict[str, Floats]]:
@@ -143,7 +145,7 @@ def test_strange_numbers_are_shown_as_files_have_them(name: str, device: Device,
     job = job_of(scene, device)
     pictures = noise(job, seed=len(name))
     with np.errstate(all="ignore"):
-        wanted = file_pixels(films_of(job, pictures))
+        wanted = file_pixels(framebuffers_of(job, pictures))
     found = shown(painted(job, device, pictures), Arrangement.of(job), look_of(scene), shower)
     assert_same(found, wanted, device)
 
@@ -232,7 +234,7 @@ def test_coarse_views_of_a_layout_stay_in_their_places(device: Device, shower: S
         }
         for n, v in enumerate(job.views)
     ]
-    np.testing.assert_array_equal(found, file_pixels(films_of(job, whole)))
+    np.testing.assert_array_equal(found, file_pixels(framebuffers_of(job, whole)))
 
 
 @pytest.mark.parametrize("mode", [None, "anaglyph", "left"])

@@ -31,7 +31,7 @@ from clfractal.errors import SceneError
 from clfractal.formulas import catalog
 from clfractal.formulas.definition import Parameter
 from clfractal.formulas.opencl import write_formula
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import from_oklab, to_oklab
@@ -388,9 +388,9 @@ def test_words_and_amounts_agree() -> None:
 # --- pictures ---
 
 
-def film(lightness: Any, covered: Any = 1.0) -> Film:
+def framebuffer(lightness: Any, covered: Any = 1.0) -> Framebuffer:
     width, height = PREVIEW_SIZE
-    found = Film(("R", "G", "B", "A"), PREVIEW_SIZE)
+    found = Framebuffer(("R", "G", "B", "A"), PREVIEW_SIZE)
     shades = np.broadcast_to(np.asarray(lightness, np.float32), (height, width))
     found.fill({**dict.fromkeys("RGB", shades), "A": np.broadcast_to(np.float32(covered), (height, width))})
     return found
@@ -399,14 +399,14 @@ def film(lightness: Any, covered: Any = 1.0) -> Film:
 def test_what_a_worthwhile_picture_is() -> None:
     width, height = PREVIEW_SIZE
     ramp = np.linspace(0, 1, width)[None, :]
-    assert worthwhile(film(ramp))
-    assert not worthwhile(film(0.2))  # the inside of a solid
-    assert not worthwhile(film(ramp * 1e-4))  # darkness
-    assert not worthwhile(film(ramp, covered=0.0))  # a background alone
+    assert worthwhile(framebuffer(ramp))
+    assert not worthwhile(framebuffer(0.2))  # the inside of a solid
+    assert not worthwhile(framebuffer(ramp * 1e-4))  # darkness
+    assert not worthwhile(framebuffer(ramp, covered=0.0))  # a background alone
     spot = np.zeros((height, width))
     spot[20:40, 30:60] = 1
-    assert worthwhile(film(np.random.default_rng(1).random((height, width)), spot))
-    assert not worthwhile(film(0.5 + spot / 2, spot))  # a flat thing before a background
+    assert worthwhile(framebuffer(np.random.default_rng(1).random((height, width)), spot))
+    assert not worthwhile(framebuffer(0.5 + spot / 2, spot))  # a flat thing before a background
 
 
 def test_previews_of_pictures_that_show_something_and_nothing(device: Device) -> None:

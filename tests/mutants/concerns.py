@@ -25,7 +25,7 @@ kernels/integrators/sampling.h: render/sampling render/filters render/surface_ra
 kernels/*/color[_i]*: render/coloring render/surface_light
 kernels/shading/color.h: render/coloring render/cut_plane render/surface_samples
 kernels/integrators/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
-kernels/integrators/spot.h: render/coloring render/lens_and_fog render/normals render/surface_light
+kernels/integrators/interaction.h: render/coloring render/lens_and_fog render/normals render/surface_light
 kernels/*/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
 kernels/integrators/secondary.h: render/surface_rays render/surface_light
 kernels/integrators/wide_lights.h: render/surface_rays render/surface_light render/light_shapes
@@ -44,7 +44,7 @@ kernels/integrators/volume/volume_bounds.h: render/volume_paths
 clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/blocks
 kernels/*/emitter*.h: render/emitter_places render/emitters
 kernels/geometry/rectangles.h: render/rectangles render/emitter_places render/light_shapes
-kernels/shading/light_asks.h: render/emitters render/light_shapes render/paths
+kernels/shading/light_sampling.h: render/emitters render/light_shapes render/paths
 kernels/shading/media.h: render/glass_objects
 kernels/integrators/glass_paths.h: render/glass_paths render/glass_objects
 kernels/shading/participating_media.h: render/participating_media
@@ -52,7 +52,7 @@ kernels/shading/bump.h: render/bump
 kernels/shading/bsdf_bumped.h: render/bumped_materials
 kernels/integrators/events.h: render/clouds render/paths render/subsurface
 kernels/geometry/water.h: render/objects
-kernels/shading/look.h: render/objects_light render/surface_light
+kernels/shading/phong_material.h: render/objects_light render/surface_light
 kernels/integrators/march/march_steps.h: render/searches
 kernels/*/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
 kernels/*/solids*: render/joined
@@ -78,7 +78,7 @@ clfractal/device/*: device/ engine/cancel
 clfractal/files/*: files/
 clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/catalog
 clfractal/camera/*: render/view render/stereo_views render/surface_analytic
-clfractal/images/*: render/film render/film_store render/compose render/anaglyph render/paste render/compose_files
+clfractal/images/*: render/framebuffer render/framebuffer_store render/compose render/anaglyph render/compose_files
 clfractal/integrators/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
 clfractal/scene/grid_place.py: render/turned_grids
 clfractal/scene/given.py: render/turned_grids scene/volume_scenes
@@ -108,7 +108,7 @@ QUICK = (
     "tests/test_cli.py",
     "tests/test_api.py",
     "tests/scene",
-    "tests/render/test_film.py",
+    "tests/render/test_framebuffer.py",
     "tests/render/test_surface_samples.py",
     "tests/render/test_stereo_pictures.py",
     "tests/render/test_volume_surface.py",

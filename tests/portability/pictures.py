@@ -22,7 +22,7 @@ from clfractal.device.structs import Precision
 from clfractal.engine.job import Identity, Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.plan import PlannedView, make_plan
 from clfractal.scene.load import load_scene
@@ -187,13 +187,13 @@ def picture(
     plan = make_plan(
         scene, precision=precision, lanes=lanes or best_lanes(device, precision), channels=CHANNELS
     )
-    film = Film(plan.channels, size, plan.region)
+    framebuffer = Framebuffer(plan.channels, size, plan.region)
     job = Job(scene, (PlannedView(scene, plan),), Identity(0), plan.channels, device.info, "")
-    run(job, [film], LocalExecutor(device))
+    run(job, [framebuffer], LocalExecutor(device))
     if isinstance(scene.renderer, SurfaceRenderer) and scene.renderer.search == "steps":
         # A binary search down to the last digit takes a step more or less where that digit differs.
-        film["steps"][:] = 0
-    return np.stack([film[channel] for channel in CHANNELS])
+        framebuffer["steps"][:] = 0
+    return np.stack([framebuffer[channel] for channel in CHANNELS])
 
 
 def scene_of(name: str, size: tuple[int, int]) -> Scene:

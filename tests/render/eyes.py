@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 
 from clfractal.images.compose import eye_regions
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.modes import eye_size, picture_size
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiles import Region
 from clfractal.scene.stereo import Stereo
 
@@ -33,7 +33,7 @@ def eyes(size: tuple[int, int], seed: int = 5) -> tuple[dict[str, np.ndarray], d
     return left, right
 
 
-def filled(store: Film | JournalFilm, planes: dict[str, np.ndarray]) -> Any:
+def filled(store: Framebuffer | JournalFramebuffer, planes: dict[str, np.ndarray]) -> Any:
     """The store with its part of the planes, which are of the whole picture."""
     for index in range(store.grid.count):
         tile = store.grid.tile(index)
@@ -42,7 +42,7 @@ def filled(store: Film | JournalFilm, planes: dict[str, np.ndarray]) -> Any:
     return store
 
 
-def films(
+def framebuffers(
     scene: Stereo, image: tuple[int, int], region: Region | None, planes: tuple[dict[str, np.ndarray], ...]
 ) -> tuple[Any, Any]:
     """What a region of the finished picture needs of each eye's; None where it needs nothing."""
@@ -50,7 +50,7 @@ def films(
     parts = eye_regions(scene, image, region or whole)
     size = eye_size(scene, image)
     left, right = (
-        part and filled(Film(CHANNELS, size, part), of)
+        part and filled(Framebuffer(CHANNELS, size, part), of)
         for part, of in zip((parts["left"], parts["right"]), planes, strict=True)
     )
     return left, right

@@ -125,10 +125,10 @@ def agree(
     degrees: float = 1.0,
 ) -> npt.NDArray[np.bool_]:
     """A picture and the distance have the same places and, at most places, normals that are `degrees` apart at most."""
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     origin, direction, footprint = rays(scene)
     t = marched(distance, origin, direction)
-    met, hit = np.isfinite(t), film["A"] == 1
+    met, hit = np.isfinite(t), framebuffer["A"] == 1
     assert ((met == hit) | beside_a_rim(met)).all()
     assert (met != hit).mean() < 0.04
     points = origin + np.where(met, t, 0)[..., None] * direction
@@ -137,10 +137,10 @@ def agree(
     front = met & hit & ((normals * direction).sum(-1) < -0.4)
     assert front.mean() > 0.1
     width = footprint * (t if scene.camera.projection == "perspective" else 1)
-    off = (np.linalg.norm(points_of(film) - points, axis=-1) / width)[front]
+    off = (np.linalg.norm(points_of(framebuffer) - points, axis=-1) / width)[front]
     assert np.median(off) < 0.25
     assert (off > 0.8).mean() < 0.04, np.percentile(off, [50, 80, 90, 95, 99])
-    angle = np.degrees(np.arccos(np.clip((normals_of(film) * normals).sum(-1), -1, 1)))[front]
+    angle = np.degrees(np.arccos(np.clip((normals_of(framebuffer) * normals).sum(-1), -1, 1)))[front]
     assert np.percentile(angle, 80) < degrees
     seen: npt.NDArray[np.bool_] = front
     return seen

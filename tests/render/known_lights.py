@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from tests.render.shots import Floats, points_of
 
 PLACE = np.array([0.3, 0.2, 2.5])
@@ -62,8 +62,8 @@ CASES = [(BALL, of_ball), (WINDOW, of_window), (SPOT, of_spot)]
 BRIGHT = {"color": [1, 1, 1], "ambient": 0, "diffuse": 0, "specular": 0}
 
 
-def ground(film: Film) -> npt.NDArray[np.bool_]:
+def ground(framebuffer: Framebuffer) -> npt.NDArray[np.bool_]:
     """Where the top of the box is seen, away from its edges."""
-    points = points_of(film)
+    points = points_of(framebuffer)
     inner = (np.abs(points[..., :2]) < 1.15).all(axis=-1)
-    return np.asarray((film["A"] == 1) & (np.abs(points[..., 2]) < 0.011) & inner)
+    return np.asarray((framebuffer["A"] == 1) & (np.abs(points[..., 2]) < 0.011) & inner)

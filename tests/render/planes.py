@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.cut_plane import renderer_of
 from clfractal.scene.model import Scene
 from clfractal.scene.rectangle import Placed
@@ -80,6 +80,6 @@ def sure(x: npt.NDArray[Any], y: npt.NDArray[Any], iterations: int, nudge: float
     return same
 
 
-def picture_of(film: Film) -> npt.NDArray[np.float32]:
+def picture_of(framebuffer: Framebuffer) -> npt.NDArray[np.float32]:
     """Colours, shape (height, width, 3)."""
-    return np.stack([film["R"], film["G"], film["B"]], axis=-1)
+    return np.stack([framebuffer["R"], framebuffer["G"], framebuffer["B"]], axis=-1)

@@ -13,7 +13,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.select import Device
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render import normals_oracle as oracle
 from tests.render.normals_oracle import unit
@@ -85,7 +85,7 @@ class Shot:
     """A picture, and the rays of all its points: shapes (SIDE, SIDE, COUNT, 3) and (SIDE, SIDE, COUNT)."""
 
     scene: Scene
-    film: Film
+    framebuffer: Framebuffer
     across: Floats
     below: Floats
     origin: Floats

@@ -15,7 +15,7 @@ from clfractal.engine.engine import Engine
 from clfractal.engine.job import Identity, Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Progress, WorkItem, run
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiled import TiledStore
 from clfractal.images.tiles import TILE, Tile
 from clfractal.integrators.lanes import best_lanes
@@ -118,28 +118,28 @@ def render_tile(scene: Scene, plan: Plan, device: Device, tile: Tile) -> npt.NDA
     (whole,) = [result for result in results if len(result.tiles)]
     assert whole.tiles.tolist() == [tile.index]
     top, left = tile.y % TILE, tile.x % TILE
-    part: npt.NDArray[np.float32] = whole.film[0][:, top : top + tile.height, left : left + tile.width]
+    part: npt.NDArray[np.float32] = whole.framebuffer[0][:, top : top + tile.height, left : left + tile.width]
     return part
 
 
 def shoot(
     scene: Scene | tuple[Scene, Eye], device: Device, precision: Precision = "float32", **settings: Any
-) -> Film:
+) -> Framebuffer:
     """The picture of a scene, or of one as an eye sees it; settings as for `make_plan`, and a budget."""
     scene, eye = scene if isinstance(scene, tuple) else (scene, MIDDLE)
     budget_seconds = settings.pop("budget_seconds", None)
     plan = plan_of(scene, device, precision, **settings)
-    film = Film(plan.channels, (scene.image.width, scene.image.height), plan.region)
-    render_planned(scene, plan, device, film, eye, budget_seconds=budget_seconds)
-    return film
+    framebuffer = Framebuffer(plan.channels, (scene.image.width, scene.image.height), plan.region)
+    render_planned(scene, plan, device, framebuffer, eye, budget_seconds=budget_seconds)
+    return framebuffer
 
 
-def shoot_whole(scene: Scene, device: Device, **settings: Any) -> Film:
+def shoot_whole(scene: Scene, device: Device, **settings: Any) -> Framebuffer:
     """The picture of a scene of several views, all of whose channels are made; settings as for `Engine.render`."""
     return engine_of(device).render(scene, **{"precision": "float32", "channels": CHANNELS, **settings})
 
 
-def repeated(scene: Scene, device: Device, names: Sequence[str]) -> tuple[Film, Film]:
+def repeated(scene: Scene, device: Device, names: Sequence[str]) -> tuple[Framebuffer, Framebuffer]:
     """A picture that its passes and a region repeat bit by bit, and the same by single lanes."""
     whole = shoot(scene, device, channels=names)
     *_, last = engine_of(device).refine(scene, channels=names)
@@ -155,17 +155,17 @@ def engine_of(device: Device) -> Engine:
     return _engines.setdefault(device, Engine(device))
 
 
-def stacked(film: Film, names: Sequence[str] = CHANNELS) -> npt.NDArray[np.float32]:
+def stacked(framebuffer: Framebuffer, names: Sequence[str] = CHANNELS) -> npt.NDArray[np.float32]:
     """Channels as one array of shape (height, width, channels)."""
-    return np.stack([film[name] for name in names], axis=-1)
+    return np.stack([framebuffer[name] for name in names], axis=-1)
 
 
-def points_of(film: Film) -> Floats:
-    return stacked(film, ("P.X", "P.Y", "P.Z")).astype(float)
+def points_of(framebuffer: Framebuffer) -> Floats:
+    return stacked(framebuffer, ("P.X", "P.Y", "P.Z")).astype(float)
 
 
-def normals_of(film: Film) -> Floats:
-    return stacked(film, ("N.X", "N.Y", "N.Z")).astype(float)
+def normals_of(framebuffer: Framebuffer) -> Floats:
+    return stacked(framebuffer, ("N.X", "N.Y", "N.Z")).astype(float)
 
 
 def rays(
@@ -207,8 +207,8 @@ def view_of(scene: Scene) -> View:
     return camera_view(scene.camera, scene.image.width, scene.image.height)
 
 
-def colors(film: Film) -> Floats:
-    return stacked(film, ("R", "G", "B")).astype(float)
+def colors(framebuffer: Framebuffer) -> Floats:
+    return stacked(framebuffer, ("R", "G", "B")).astype(float)
 
 
 def degrees(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Floats:

@@ -323,11 +323,11 @@ def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> Non
     pictures = []
     for each in (1, lanes):
         monkeypatch.setenv("CLFRACTAL_LANES", str(each))
-        film = clfractal.render(
+        framebuffer = clfractal.render(
             relief({"by": "normal", "curve": [[0, 0], [1, 0.2]]}, width=0.05, lighting=path(1), **BULB),
             channels=("R", "normal.X"),
         )
-        pictures.append(np.stack([np.asarray(film[name]) for name in ("R", "normal.X")]))
+        pictures.append(np.stack([np.asarray(framebuffer[name]) for name in ("R", "normal.X")]))
     assert np.ptp(pictures[0][1]) > 1
     assert np.abs(pictures[0] - pictures[1]).mean() < 1e-3
 
@@ -343,11 +343,11 @@ def test_traps_on_objects_beside_the_set() -> None:
             "color": {"by": by, "trap": {"shape": "plane"}, "palette": [[0, 0, 0], [1, 1, 1]]},
         }
         scene = relief(0, materials={"m": {**dark, "emission": emission}}, objects={"board": board})
-        film = clfractal.render(scene, channels=("R", "P.X", "P.Y", "P.Z"))
-        place = np.stack([np.asarray(film[f"P.{axis}"], np.float64) for axis in "XYZ"], axis=-1)
+        framebuffer = clfractal.render(scene, channels=("R", "P.X", "P.Y", "P.Z"))
+        place = np.stack([np.asarray(framebuffer[f"P.{axis}"], np.float64) for axis in "XYZ"], axis=-1)
         beside = np.abs(place[..., 1] - 1.5) < 1e-3
         assert beside.sum() > 300
-        shown = np.asarray(film["R"])[beside]
+        shown = np.asarray(framebuffer["R"])[beside]
         if expected is not None:
             assert np.abs(shown - expected).max() < 1e-6
             continue

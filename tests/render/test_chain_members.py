@@ -129,6 +129,6 @@ def test_a_volume_takes_no_early_rest_for_a_period() -> None:
 
 def test_a_plane_takes_no_early_rest_for_a_period(device: Device) -> None:
     keys: dict[str, Any] = {"iterations": 110, "plane": {"width": 1.2, "height": 1.2}, "samples": 1}
-    film = shoot(plane_scene(LATE, (48, 48), colors={"mode": "stepped"}, **keys), device)
-    radius = np.hypot(film["P.X"].astype(float), film["P.Y"].astype(float))
-    np.testing.assert_array_equal(film["iterations"] == 110, radius < 0.25)
+    framebuffer = shoot(plane_scene(LATE, (48, 48), colors={"mode": "stepped"}, **keys), device)
+    radius = np.hypot(framebuffer["P.X"].astype(float), framebuffer["P.Y"].astype(float))
+    np.testing.assert_array_equal(framebuffer["iterations"] == 110, radius < 0.25)

@@ -115,13 +115,13 @@ def test_a_white_cloud_before_white_is_not_seen(device: Device, folder: Path, an
 def test_what_comes_through(device: Device, folder: Path, precision: Precision, lanes: int | None) -> None:
     """exp(-depth) of a white sky behind a black cloud that is turned and scaled; alpha is the rest."""
     scene = scene_of(folder, {"cloud": cloud("waves.nrrd", **TURNED)}, samples=1024, **WHITE)
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     origin, direction, _ = rays(scene)
     expected = np.exp(-depth_of(scene, "cloud", waves(), origin, direction))
     assert expected.min() < 0.5
-    assert_alike(film["R"], expected, 1024)
+    assert_alike(framebuffer["R"], expected, 1024)
     # Alpha and colour are means of the same samples.
-    np.testing.assert_allclose(film["A"], 1 - film["R"], atol=1e-5)
+    np.testing.assert_allclose(framebuffer["A"], 1 - framebuffer["R"], atol=1e-5)
 
 
 def test_what_comes_through_an_oblique_cloud(device: Device, folder: Path) -> None:
@@ -226,9 +226,9 @@ def test_layers_have_the_light_of_clouds(device: Device, folder: Path) -> None:
         folder, objects, samples=4, background="transparent", lighting={"mode": "path", "bounces": 2}
     )
     layers = [f"{name}.R" for name in ("emission", "direct", "indirect")]
-    film = shoot(scene, device, channels=["R", "A", *layers])
-    assert film["R"][film["A"] == 0].max() > 0.05
-    np.testing.assert_allclose(sum(film[name] for name in layers), film["R"], atol=1e-6)
+    framebuffer = shoot(scene, device, channels=["R", "A", *layers])
+    assert framebuffer["R"][framebuffer["A"] == 0].max() > 0.05
+    np.testing.assert_allclose(sum(framebuffer[name] for name in layers), framebuffer["R"], atol=1e-6)
 
 
 @pytest.mark.combination

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
 from clfractal.images.compose import Composed, compose, composed_channels, eye_regions
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.modes import eye_size, picture_size
 from clfractal.images.tiles import Region
-from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, films, stereo
+from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, framebuffers, stereo
 
 
 def by_loops(mode: str, swap: bool, left: np.ndarray, right: np.ndarray, x: int, y: int) -> tuple[Any, bool]:
@@ -42,18 +42,18 @@ def test_modes_pixel_by_pixel(mode: str, swap: bool) -> None:
     scene = stereo(mode, swap=swap, colors=[[0.75, 0.5, 0.0], [0.25, 1.0, 0.125]])
     image = (46, 38)
     planes = eyes(eye_size(scene, image))
-    composed = Composed(scene, image, *films(scene, image, None, planes))
-    film = composed.to_film()
+    composed = Composed(scene, image, *framebuffers(scene, image, None, planes))
+    framebuffer = composed.to_framebuffer()
     width, height = picture_size(scene, image)
-    assert (film.width, film.height) == composed.display == (width, height)
-    assert film.channels == CHANNELS
+    assert (framebuffer.width, framebuffer.height) == composed.display == (width, height)
+    assert framebuffer.channels == CHANNELS
     for name in CHANNELS:
         for y in range(height):
             for x in range(width):
                 found, second = by_loops(mode, swap, planes[0][name], planes[1][name], x, y)
                 if mode == "anaglyph_chessboard" and name in "RGB":
                     found *= np.float32(scene.colors[int(second)]["RGB".index(name)])
-                assert film[name][y, x] == found, (name, x, y)
+                assert framebuffer[name][y, x] == found, (name, x, y)
 
 
 @pytest.mark.parametrize(
@@ -121,8 +121,8 @@ def test_a_region_is_the_same_part_of_the_whole(data: st.DataObject) -> None:
     x, y = data.draw(st.integers(0, width - 1)), data.draw(st.integers(0, height - 1))
     region = Region(x, y, data.draw(st.integers(1, width - x)), data.draw(st.integers(1, height - y)))
     planes = eyes(eye_size(scene, image))
-    whole = Composed(scene, image, *films(scene, image, None, planes)).to_film()
-    part = Composed(scene, image, *films(scene, image, region, planes), region)
+    whole = Composed(scene, image, *framebuffers(scene, image, None, planes)).to_framebuffer()
+    part = Composed(scene, image, *framebuffers(scene, image, region, planes), region)
     assert (part.display, part.region) == ((width, height), region)
     row = region.y
     for first, band in part.bands():
@@ -209,14 +209,16 @@ def test_odd_numbers_go_through() -> None:
 def test_an_eye_alone_is_passed_on_as_it_is() -> None:
     cameras = {"worldToCamera": np.eye(4), "view": "right", "scene": "version: 1\n"}
     left, right = eyes((33, 34))
-    film = filled(Film(CHANNELS, (33, 34), header=cameras), right)
-    shown = Composed(stereo("right", swap=True), (33, 34), None, film)
+    framebuffer = filled(Framebuffer(CHANNELS, (33, 34), header=cameras), right)
+    shown = Composed(stereo("right", swap=True), (33, 34), None, framebuffer)
     assert shown.header.keys() == cameras.keys()
     for name in CHANNELS:
-        assert np.array_equal(shown.to_film()[name], right[name])
+        assert np.array_equal(shown.to_framebuffer()[name], right[name])
     # The other eye's picture is not even looked at.
-    other = filled(Film(CHANNELS, (33, 34)), left)
-    assert np.array_equal(Composed(stereo("right"), (33, 34), other, film).to_film()["R"], right["R"])
+    other = filled(Framebuffer(CHANNELS, (33, 34)), left)
+    assert np.array_equal(
+        Composed(stereo("right"), (33, 34), other, framebuffer).to_framebuffer()["R"], right["R"]
+    )
 
 
 def test_headers_tell_what_both_pictures_do() -> None:
@@ -225,20 +227,20 @@ def test_headers_tell_what_both_pictures_do() -> None:
         {**common, "worldToCamera": np.eye(4), "worldToNDC": np.eye(4), "view": view, "seconds": seconds}
         for view, seconds in (("left", 1.0), ("right", 2.0))
     ]
-    left, right = (Film(CHANNELS, (8, 8), header=header) for header in headers)
+    left, right = (Framebuffer(CHANNELS, (8, 8), header=header) for header in headers)
     composed = Composed(stereo("rows"), (8, 8), left, right, header={"seconds": 3.0})
     assert composed.header == {**common, "seconds": 3.0}
 
 
 def test_stores_that_do_not_fit_are_mistakes() -> None:
     scene, image = stereo("split"), (20, 10)
-    left, right = Film(CHANNELS, image), Film(CHANNELS, image)
+    left, right = Framebuffer(CHANNELS, image), Framebuffer(CHANNELS, image)
     with pytest.raises(ValueError, match="right eye's picture must hold"):
         Composed(scene, image, left, None)
     with pytest.raises(ValueError, match="left eye's picture must hold"):
-        Composed(scene, image, Film(CHANNELS, image, Region(0, 0, 20, 9)), right)
+        Composed(scene, image, Framebuffer(CHANNELS, image, Region(0, 0, 20, 9)), right)
     with pytest.raises(ValueError, match="same channels"):
-        Composed(scene, image, left, Film(("R",), image))
+        Composed(scene, image, left, Framebuffer(("R",), image))
     for mode in ("pair", "multi_view"):
         with pytest.raises(ValueError, match="keeps the two eyes' pictures apart"):
             Composed(stereo(mode), image, left, right)

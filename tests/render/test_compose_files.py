@@ -15,11 +15,11 @@ from clfractal.errors import FileError
 from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.images.compose import Composed, eye_regions
-from clfractal.images.film import Film
 from clfractal.images.formats import check_views
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.modes import eye_size
 from clfractal.images.outputs import pair_paths, save_outputs, save_views
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, stereo
 
@@ -41,15 +41,15 @@ def test_files_from_disk_and_from_memory_are_the_same(tmp_path: Path, mode: str)
             disk.append(None)
             continue
         size = eye_size(scene, image)
-        memory.append(filled(Film(CHANNELS, size, part, header), of))
-        journal = JournalFilm(tmp_path / f"{side}.partial", {}, CHANNELS, size, part, header)
+        memory.append(filled(Framebuffer(CHANNELS, size, part, header), of))
+        journal = JournalFramebuffer(tmp_path / f"{side}.partial", {}, CHANNELS, size, part, header)
         disk.append(filled(journal, of))
     for name, stores in (("memory", memory), ("disk", disk)):
         composed = Composed(scene, image, stores[0], stores[1], region)
         save_outputs(composed, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
     for suffix in ("exr", "png"):
         assert (tmp_path / f"memory.{suffix}").read_bytes() == (tmp_path / f"disk.{suffix}").read_bytes()
-    whole = Composed(scene, image, memory[0], memory[1], region).to_film()
+    whole = Composed(scene, image, memory[0], memory[1], region).to_framebuffer()
     found, attributes = read_exr(tmp_path / "disk.exr")
     assert sorted(found) == sorted(whole.channels)
     assert np.array_equal(found["R"], whole["R"].astype(np.float16))
@@ -64,11 +64,11 @@ def test_a_few_rows_at_a_time_are_in_memory(tmp_path: Path, mode: str) -> None:
     size = (256, 1024)
     stores: list[Any] = []
     for side in ("left", "right"):
-        film = JournalFilm(tmp_path / side, {}, CHANNELS, size)
+        framebuffer = JournalFramebuffer(tmp_path / side, {}, CHANNELS, size)
         tile = np.random.default_rng(0).random((len(CHANNELS), 32, 32), dtype=np.float32)
-        for index in range(film.grid.count):
-            film.put(index, tile)
-        stores.append(film)
+        for index in range(framebuffer.grid.count):
+            framebuffer.put(index, tile)
+        stores.append(framebuffer)
     composed = Composed(stereo(mode), size, stores[0], stores[1])
     band = 32 * size[0] * len(CHANNELS) * 4  # bytes of an eye's row of tiles, a 32nd of its picture
     tracemalloc.start()
@@ -93,7 +93,7 @@ def test_both_views_in_one_file(tmp_path: Path) -> None:
             "tileDevices": f"4*{number + 1}",
             "seconds": 0.5 + number,
         }
-        stores.append(filled(Film(CHANNELS, (70, 60), Region(20, 10, 50, 40), header), shifted(of)))
+        stores.append(filled(Framebuffer(CHANNELS, (70, 60), Region(20, 10, 50, 40), header), shifted(of)))
     save_views(stores[0], stores[1], tmp_path / "a.exr")
     found, told = read_exr(tmp_path / "a.exr")
     expected = "R G B A Z N.left.X right.R right.G right.B right.A right.Z N.right.X"
@@ -125,10 +125,10 @@ def shifted(planes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 
 def test_views_that_cannot_be_written(tmp_path: Path) -> None:
-    film = Film(CHANNELS, (8, 8))
+    framebuffer = Framebuffer(CHANNELS, (8, 8))
     message = r"a\.png: a PNG has room for one view; write both to an EXR"
     with pytest.raises(FileError, match=message):
-        save_views(film, film, tmp_path / "a.png")
+        save_views(framebuffer, framebuffer, tmp_path / "a.png")
     with pytest.raises(FileError, match=message):
         check_views(tmp_path / "a.png")
     with pytest.raises(FileError, match="a JPEG has room for one view"):
@@ -136,7 +136,7 @@ def test_views_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(FileError, match="unknown extension"):
         check_views(tmp_path / "a.gif")
     with pytest.raises(ValueError, match="same size, region and channels"):
-        save_views(film, Film(CHANNELS, (8, 9)), tmp_path / "a.exr")
+        save_views(framebuffer, Framebuffer(CHANNELS, (8, 9)), tmp_path / "a.exr")
     assert not list(tmp_path.iterdir())
 
 
@@ -144,15 +144,15 @@ def test_a_pairs_files(tmp_path: Path) -> None:
     assert pair_paths("out.exr") == (Path("out_L.exr"), Path("out_R.exr"))
     assert pair_paths(tmp_path / "a.b.PNG") == (tmp_path / "a.b_L.PNG", tmp_path / "a.b_R.PNG")
     for path, view in zip(pair_paths(tmp_path / "a.exr"), ("left", "right"), strict=True):
-        film = Film(CHANNELS, (8, 8), header={"view": view})
-        save_outputs(film, [path])
+        framebuffer = Framebuffer(CHANNELS, (8, 8), header={"view": view})
+        save_outputs(framebuffer, [path])
         assert read_exr(path)[1]["view"] == view
 
 
 def test_views_are_written_a_few_rows_at_a_time(tmp_path: Path) -> None:
     taken: list[str] = []
 
-    class Watched(Film):
+    class Watched(Framebuffer):
         def bands(self) -> Iterator[tuple[int, dict[str, np.ndarray]]]:
             for row, band in super().bands():
                 taken.append(f"{self.header['side']}{row}")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import march, waves
 from clfractal.integrators.kernel import BLOCK
 from clfractal.integrators.plan import make_plan
@@ -59,12 +59,12 @@ FORMULAS: dict[str, dict[str, Any]] = {
 SPHERE = {"name": "quaternion_julia", "iterations": 8, "julia": [0, 0, 0, 0]}
 
 
-def rendered(scene: Scene, device: Device) -> tuple[Film, int]:
+def rendered(scene: Scene, device: Device) -> tuple[Framebuffer, int]:
     """The picture, and how many steps its rays have taken."""
     plan = plan_of(scene, device)
-    film = Film(plan.channels, (scene.image.width, scene.image.height), plan.region)
-    state = render_planned(scene, plan, device, film)
-    return film, state.steps
+    framebuffer = Framebuffer(plan.channels, (scene.image.width, scene.image.height), plan.region)
+    state = render_planned(scene, plan, device, framebuffer)
+    return framebuffer, state.steps
 
 
 def without_cones(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -99,12 +99,12 @@ def test_a_block_sees_what_is_smaller_than_a_pixel_anywhere_in_it(
     camera = {"position": [0, -40, 0], "target": [0, 0, 0], "up": [0, 0, 1], "fov": 60}
     for side in range(2 * BLOCK, 3 * BLOCK):
         scene = scene_of(SPHERE, camera, (side, side + 3), lights=LIGHTS, renderer=renderer)
-        film, _ = rendered(scene, device)
+        framebuffer, _ = rendered(scene, device)
         with monkeypatch.context() as patch:
             without_cones(patch)
             alone, _ = rendered(scene, device)
-        np.testing.assert_allclose(film["A"], alone["A"], atol=1e-6)
-        assert film["A"].sum() > 0.3, side
+        np.testing.assert_allclose(framebuffer["A"], alone["A"], atol=1e-6)
+        assert framebuffer["A"].sum() > 0.3, side
 
 
 @pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "scalar rule"])

@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.formulas import reference
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.devices import check_usable
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
@@ -23,7 +23,7 @@ MODES: dict[str, dict[str, Any]] = {"direct": {}, "path": {"lighting": {"mode": 
 FRONT = np.array(PLANES[0]["plane"]["normal"]) / np.linalg.norm(PLANES[0]["plane"]["normal"])
 
 
-def film_of(scene: Scene, device: Device, **settings: Any) -> Film:
+def framebuffer_of(scene: Scene, device: Device, **settings: Any) -> Framebuffer:
     return shoot(scene, device, **{"channels": CHANNELS, **settings})
 
 
@@ -40,7 +40,7 @@ def test_each_plane_cuts_what_it_names(device: Device, mode: str) -> None:
     """The set has the first plane's face only, though the other passes it; the crate has the other's; the egg, in front of
     both, is whole. Places, normals, counts, colours and things, pixel by pixel."""
     scene = scene_of(**MODES[mode])
-    film = film_of(scene, device)
+    framebuffer = framebuffer_of(scene, device)
     found, at, _ = met_by_eye(scene)
     sure = found.sure & (found.body >= 0)
     assert (~found.sure).mean() < 0.15
@@ -49,36 +49,38 @@ def test_each_plane_cuts_what_it_names(device: Device, mode: str) -> None:
     assert (found.plane[faces[0]] == 0).all()
     assert (found.plane[faces[1]] == 1).all()
     assert (sure & (found.body == 2)).sum() > 60
-    np.testing.assert_allclose(points_of(film)[sure], at[sure], atol=4e-3)
+    np.testing.assert_allclose(points_of(framebuffer)[sure], at[sure], atol=4e-3)
     face = sure & (found.plane >= 0)
-    np.testing.assert_allclose(points_of(film)[face], at[face], atol=2e-5)
-    np.testing.assert_allclose(normals_of(film)[face], found.normal[face], atol=1e-6)
+    np.testing.assert_allclose(points_of(framebuffer)[face], at[face], atol=2e-5)
+    np.testing.assert_allclose(normals_of(framebuffer)[face], found.normal[face], atol=1e-6)
     beside = sure & (found.body > 0)
-    np.testing.assert_allclose(normals_of(film)[beside], found.normal[beside], atol=1e-4)
+    np.testing.assert_allclose(normals_of(framebuffer)[beside], found.normal[beside], atol=1e-4)
     tint, certain = face_tint(scene, found, at)
     face &= certain
-    np.testing.assert_allclose(stacked(film, ALBEDO)[face], tint[face], atol=2e-4)
-    np.testing.assert_array_equal(np.unique(film["iterations"][faces[1]]), [3])
+    np.testing.assert_allclose(stacked(framebuffer, ALBEDO)[face], tint[face], atol=2e-4)
+    np.testing.assert_array_equal(np.unique(framebuffer["iterations"][faces[1]]), [3])
     counts = reference.escape(scene.chain, at[faces[0] & certain], 8)[0]
-    np.testing.assert_array_equal(film["iterations"][faces[0] & certain], counts)
+    np.testing.assert_array_equal(framebuffer["iterations"][faces[0] & certain], counts)
     assert {4, 5, 6, 7, 8} == set(counts.tolist())
     for body in range(len(BODIES)):
-        assert len(np.unique(film["object"][sure & (found.body == body)])) == 1
-    assert not film["A"][found.sure & (found.body < 0)].any()
+        assert len(np.unique(framebuffer["object"][sure & (found.body == body)])) == 1
+    assert not framebuffer["A"][found.sure & (found.body < 0)].any()
 
 
 def test_faces_have_no_light_in_phongs(device: Device) -> None:
     """They show their colours, and a mirror shows the same."""
     scene = scene_of(renderer={"detail": 0.05, "bounces": 1}, lights=[{"direction": [0.2, 1, -1]}])
-    film = film_of(scene, device)
+    framebuffer = framebuffer_of(scene, device)
     found, at, direction = met_by_eye(scene)
     tint, certain = face_tint(scene, found, at)
     face = found.sure & certain & (found.plane >= 0)
-    np.testing.assert_allclose(stacked(film, "RGB")[face], tint[face], atol=2e-4)
-    check_mirrored(scene, film, found, at, direction, lambda tint, normal: tint)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[face], tint[face], atol=2e-4)
+    check_mirrored(scene, framebuffer, found, at, direction, lambda tint, normal: tint)
 
 
-def check_mirrored(scene: Scene, film: Film, found: Met, at: Floats, direction: Floats, shown: Any) -> None:
+def check_mirrored(
+    scene: Scene, framebuffer: Framebuffer, found: Met, at: Floats, direction: Floats, shown: Any
+) -> None:
     """Where the mirror reflects a face the picture has the face's light; `shown` makes it of its colour and normal."""
     here = found.sure & (found.body == BODIES.index("mirror")) & (found.normal[..., 2] > 0.5)
     start = at[here]
@@ -90,7 +92,7 @@ def check_mirrored(scene: Scene, film: Film, found: Met, at: Floats, direction: 
     assert mirrored.sum() > 25
     expected = shown(tint[mirrored], other.normal[mirrored])
     # (Along paths a mirror is a little rough, so that single pixels see another ring.)
-    alike = np.isclose(stacked(film, "RGB")[here][mirrored], expected, atol=2e-3).all(-1)
+    alike = np.isclose(stacked(framebuffer, "RGB")[here][mirrored], expected, atol=2e-3).all(-1)
     assert alike.mean() > 0.97
 
 
@@ -100,7 +102,7 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
     lamp = {"direction": list(-toward), "intensity": 0.7, "shadow": False}
     toward = toward / np.linalg.norm(toward)
     scene, further = (scene_of(lighting={"mode": "path", "bounces": each}, lights=[lamp]) for each in (0, 1))
-    film = film_of(scene, device)
+    framebuffer = framebuffer_of(scene, device)
     found, at, direction = met_by_eye(scene)
     tint, certain = face_tint(scene, found, at)
     face = found.sure & certain & (found.plane >= 0)
@@ -108,10 +110,10 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
     assert {0, 1} == set(np.unique(found.plane[face]))
     assert cosine[face].min() > 0.3
     expected = 0.7 * tint * cosine[..., None]
-    np.testing.assert_allclose(stacked(film, "RGB")[face], expected[face], atol=2e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[face], expected[face], atol=2e-4)
     check_mirrored(
         further,
-        film_of(further, device),
+        framebuffer_of(further, device),
         found,
         at,
         direction,
@@ -122,17 +124,17 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
 def test_lit_straight_on_faces_look_as_in_phongs_light(device: Device) -> None:
     """Where a light of intensity 1 shines along the first plane's normal, its face has its colours in both modes."""
     light = {"direction": list(-FRONT), "shadow": True}
-    films = [film_of(scene_of(lights=[light], **each), device) for each in MODES.values()]
+    framebuffers = [framebuffer_of(scene_of(lights=[light], **each), device) for each in MODES.values()]
     scene = scene_of()
     found, at, _ = met_by_eye(scene)
     tint, certain = face_tint(scene, found, at)
     face = found.sure & certain & (found.plane == 0)
-    lit = face & (stacked(films[1], "RGB").max(-1) > 0)
+    lit = face & (stacked(framebuffers[1], "RGB").max(-1) > 0)
     assert lit.sum() > 0.8 * face.sum(), "the egg throws a shadow"
-    np.testing.assert_allclose(stacked(films[0], "RGB")[lit], tint[lit], atol=2e-4)
-    np.testing.assert_allclose(stacked(films[1], "RGB")[lit], tint[lit], atol=2e-4)
+    np.testing.assert_allclose(stacked(framebuffers[0], "RGB")[lit], tint[lit], atol=2e-4)
+    np.testing.assert_allclose(stacked(framebuffers[1], "RGB")[lit], tint[lit], atol=2e-4)
     for name in ("Z", "N.X", "N.Y", "N.Z", "iterations", "A", "object"):
-        np.testing.assert_array_equal(films[0][name][face], films[1][name][face])
+        np.testing.assert_array_equal(framebuffers[0][name][face], framebuffers[1][name][face])
 
 
 def test_shadows_end_where_cuts_begin(device: Device) -> None:
@@ -145,13 +147,13 @@ def test_shadows_end_where_cuts_begin(device: Device) -> None:
         lights=[{"direction": list(-toward)}],
         materials={"mirror": matt},
     )
-    film = film_of(scene, device)
+    framebuffer = framebuffer_of(scene, device)
     found, at, _ = met_by_eye(scene)
     here = found.sure & (found.body == BODIES.index("mirror")) & (found.normal[..., 2] > 0.5)
     start = at[here] + [0, 0, 1e-4]
     blocked = first_met(scene, start, np.broadcast_to(toward, start.shape))
     sure = blocked.sure
-    dark = film["R"][here] == 0
+    dark = framebuffer["R"][here] == 0
     assert ((blocked.body >= 0) & sure).sum() > 80
     # What was there before: whole bodies would have dark places more.
     whole = first_met(
@@ -159,7 +161,7 @@ def test_shadows_end_where_cuts_begin(device: Device) -> None:
     )
     assert (sure & whole.sure & (whole.body >= 0) & (blocked.body < 0)).sum() > 60
     assert (dark != (blocked.body >= 0))[sure].mean() < 5e-3
-    np.testing.assert_allclose(film["R"][here][sure & ~dark], toward[2], atol=1e-3)
+    np.testing.assert_allclose(framebuffer["R"][here][sure & ~dark], toward[2], atol=1e-3)
 
 
 def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
@@ -169,14 +171,14 @@ def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
     scene = scene_of(
         background=sky, lighting=lighting, cut_planes=WHITE, renderer={"detail": 0.05, "samples": 8}
     )
-    film = film_of(scene, device)
+    framebuffer = framebuffer_of(scene, device)
     found, _, _ = met_by_eye(scene)
     for body in (0, 1):
         face = found.sure & (found.body == body) & (found.plane >= 0)
-        assert abs(film["G"][face].mean() - 1) < 2e-3
+        assert abs(framebuffer["G"][face].mean() - 1) < 2e-3
     # At the edge of a cut few hits face away from the eye, as at any rim.
-    assert abs(film["G"].mean() - 1) < 1e-3
-    assert (abs(film["G"] - 1) > 0.01).mean() < 0.01
+    assert abs(framebuffer["G"].mean() - 1) < 1e-3
+    assert (abs(framebuffer["G"] - 1) > 0.01).mean() < 0.01
 
 
 @pytest.mark.combination
@@ -185,9 +187,9 @@ def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
 def test_packets_and_single_lanes_see_the_same(device: Device, mode: str, precision: Any) -> None:
     check_usable(precision)
     scene = scene_of(**MODES[mode], lights=[{"direction": [0.2, 1, -1]}])
-    films = [film_of(scene, device, precision=precision, lanes=lanes) for lanes in (1, 4, 8)]
+    framebuffers = [framebuffer_of(scene, device, precision=precision, lanes=lanes) for lanes in (1, 4, 8)]
     found, _, _ = met_by_eye(scene)
-    for other in films[1:]:
+    for other in framebuffers[1:]:
         for name in CHANNELS:
-            near = np.isclose(films[0][name], other[name], atol=1e-4, equal_nan=True)
+            near = np.isclose(framebuffers[0][name], other[name], atol=1e-4, equal_nan=True)
             assert (near | ~found.sure).mean() > 0.998, name

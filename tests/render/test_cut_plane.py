@@ -54,36 +54,38 @@ class TestMandelbrot:
             return
         size = (96, 96) if iterations < 1000 else (40, 40)
         scene = plane_scene(size=size, iterations=iterations, plane=plane, colors=STEPPED)
-        film = shoot(scene, device, precision)
+        framebuffer = shoot(scene, device, precision)
         points = pixel_points(scene).astype(np.longdouble)
         x, y = points[..., 0], points[..., 1]
         certain = sure(x, y, iterations, NUDGE[precision])
         count, _ = mandelbrot(x, y, iterations)
         assert certain.mean() > least
-        np.testing.assert_array_equal(film["iterations"][certain], count[certain])
+        np.testing.assert_array_equal(framebuffer["iterations"][certain], count[certain])
         assert len(np.unique(count[certain])) > 20
-        inside = (picture_of(film) == 0).all(axis=-1)
+        inside = (picture_of(framebuffer) == 0).all(axis=-1)
         np.testing.assert_array_equal(inside[certain], count[certain] == iterations)
 
     def test_smooth_counts(self, device: Device) -> None:
         scene = plane_scene(size=(128, 128), iterations=100, plane=WHOLE, colors=SMOOTH)
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         points = pixel_points(scene)
         x, y = points[..., 0], points[..., 1]
         count, radius = mandelbrot(x, y, 110, SMOOTH_RADIUS)
         certain = sure(x, y, 110, NUDGE["float32"]) & (count < 60)
         expected = count - np.log2(np.log(np.maximum(radius, SMOOTH_RADIUS)) / np.log(SMOOTH_RADIUS))
-        np.testing.assert_allclose(film["iterations"][certain], expected[certain], atol=1e-2)
+        np.testing.assert_allclose(framebuffer["iterations"][certain], expected[certain], atol=1e-2)
         assert certain.sum() > 5000
-        assert (film["iterations"][count == 110] == 100).mean() > 0.99
+        assert (framebuffer["iterations"][count == 110] == 100).mean() > 0.99
 
     def test_whole_counts_are_those_of_escape(self, device: Device) -> None:
         scene = plane_scene(size=(128, 128), iterations=200, plane=WHOLE, colors=STEPPED)
-        film = shoot(scene, device)
-        points = stacked(film, ("P.X", "P.Y", "P.Z")).reshape(-1, 3)
+        framebuffer = shoot(scene, device)
+        points = stacked(framebuffer, ("P.X", "P.Y", "P.Z")).reshape(-1, 3)
         count, _ = clfractal.escape("hast", points, iterations=200)
-        certain = sure(film["P.X"].astype(float), film["P.Y"].astype(float), 200, NUDGE["float32"])
-        np.testing.assert_array_equal(count.reshape(128, 128)[certain], film["iterations"][certain])
+        certain = sure(
+            framebuffer["P.X"].astype(float), framebuffer["P.Y"].astype(float), 200, NUDGE["float32"]
+        )
+        np.testing.assert_array_equal(count.reshape(128, 128)[certain], framebuffer["iterations"][certain])
         # The others lie at the set's border, where counts are chaos: each program adds and multiplies in one rounding or in
         # two as its compiler likes, and another lane count is another program. With one lane count both agree everywhere,
         # with two in 0.998 to 0.999 of all points, and lanes are measured: so nothing is asked of those points.
@@ -97,9 +99,9 @@ class TestIterations:
         colors = {"mode": "stepped", "curve": curve}
         own = plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors, plane_iterations=70)
         whole = plane_scene(size=(48, 48), iterations=70, plane=WHOLE, colors=colors)
-        film = shoot(own, device)
-        assert stacked(film).tobytes() == stacked(shoot(whole, device)).tobytes()
-        assert film["iterations"].max() == 70
+        framebuffer = shoot(own, device)
+        assert stacked(framebuffer).tobytes() == stacked(shoot(whole, device)).tobytes()
+        assert framebuffer["iterations"].max() == 70
         short = shoot(plane_scene(size=(48, 48), iterations=9, plane=WHOLE, colors=colors), device)
         assert short["iterations"].max() == 9
 
@@ -114,27 +116,27 @@ class TestChannels:
             "transform": [{"rotate_normal": 20}, {"rotate_x": 10}, {"move_side": 0.25}],
         }
         scene = plane_scene(size=(60, 40), plane=plane, colors=STEPPED)
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         placed = renderer_of(scene).plane.placed
-        points = stacked(film, ("P.X", "P.Y", "P.Z"))
+        points = stacked(framebuffer, ("P.X", "P.Y", "P.Z"))
         np.testing.assert_allclose(points, pixel_points(scene), atol=1e-6)
         np.testing.assert_allclose(points[20:, :30].mean(axis=(0, 1)), placed.at(0.25, 0.0), atol=1)
-        normals = stacked(film, ("N.X", "N.Y", "N.Z"))
+        normals = stacked(framebuffer, ("N.X", "N.Y", "N.Z"))
         np.testing.assert_allclose(normals, np.broadcast_to(placed.normal, normals.shape), atol=1e-6)
-        assert (film["Z"] == 0).all()
-        assert (film["A"] == 1).all()
-        assert (film["samples"] == 1).all()
-        assert (film["steps"] >= 1).all()
-        assert (film["steps"] <= film["iterations"]).all()
+        assert (framebuffer["Z"] == 0).all()
+        assert (framebuffer["A"] == 1).all()
+        assert (framebuffer["samples"] == 1).all()
+        assert (framebuffer["steps"] >= 1).all()
+        assert (framebuffer["steps"] <= framebuffer["iterations"]).all()
         # Counts are those of the points, by NumPy and in float64.
         count, _ = reference.escape(scene.chain, pixel_points(scene).reshape(-1, 3), 64)
-        assert (count.reshape(40, 60) == film["iterations"]).mean() > 0.98
+        assert (count.reshape(40, 60) == framebuffer["iterations"]).mean() > 0.98
 
     def test_up_is_up_and_right_is_right(self, device: Device) -> None:
-        film = shoot(plane_scene(size=(8, 8), plane={"normal": [0, -1, 0]}, colors=STEPPED), device)
-        assert (np.diff(film["P.X"], axis=1) > 0).all()
-        assert (np.diff(film["P.Z"], axis=0) < 0).all()
-        assert np.abs(film["P.Y"]).max() == 0
+        framebuffer = shoot(plane_scene(size=(8, 8), plane={"normal": [0, -1, 0]}, colors=STEPPED), device)
+        assert (np.diff(framebuffer["P.X"], axis=1) > 0).all()
+        assert (np.diff(framebuffer["P.Z"], axis=0) < 0).all()
+        assert np.abs(framebuffer["P.Y"]).max() == 0
 
     def test_a_part_a_tile_and_the_whole_have_the_same_bits(self, device: Device) -> None:
         scene = plane_scene(size=(80, 70), plane=WHOLE, colors=STEPPED, samples=4)
@@ -185,13 +187,13 @@ class TestColors:
             "repeat": repeat,
             "inside": [0.25, 0.5, 2],
         }
-        film = shoot(plane_scene(size=(48, 48), plane=WHOLE, colors=colors), device)
-        inside = film["iterations"] == 64
-        quantity = CURVES[curve](film["iterations"].astype(float))
+        framebuffer = shoot(plane_scene(size=(48, 48), plane=WHOLE, colors=colors), device)
+        inside = framebuffer["iterations"] == 64
+        quantity = CURVES[curve](framebuffer["iterations"].astype(float))
         wanted = palette_by_numpy("magma", 2.5 * quantity - 0.3, repeat=repeat)
-        np.testing.assert_allclose(picture_of(film)[~inside], wanted[~inside], atol=2e-4)
+        np.testing.assert_allclose(picture_of(framebuffer)[~inside], wanted[~inside], atol=2e-4)
         np.testing.assert_array_equal(
-            picture_of(film)[inside], np.broadcast_to([0.25, 0.5, 2], (inside.sum(), 3))
+            picture_of(framebuffer)[inside], np.broadcast_to([0.25, 0.5, 2], (inside.sum(), 3))
         )
         assert 0.1 < inside.mean() < 0.5
 
@@ -200,10 +202,10 @@ class TestColors:
         """C itself is the first application: nobody within the bailout has escaped, and no curve breaks."""
         colors = {**SMOOTH, "curve": curve}
         plane = {"width": 12, "height": 12}
-        film = shoot(plane_scene(size=(32, 32), iterations=1, plane=plane, colors=colors), device)
-        assert np.isfinite(stacked(film)).all()
-        radius = np.hypot(film["P.X"], film["P.Y"])
-        np.testing.assert_array_equal((picture_of(film) == 0).all(axis=-1), radius <= 4)
+        framebuffer = shoot(plane_scene(size=(32, 32), iterations=1, plane=plane, colors=colors), device)
+        assert np.isfinite(stacked(framebuffer)).all()
+        radius = np.hypot(framebuffer["P.X"], framebuffer["P.Y"])
+        np.testing.assert_array_equal((picture_of(framebuffer) == 0).all(axis=-1), radius <= 4)
 
 
 class TestSolids:
@@ -211,9 +213,9 @@ class TestSolids:
         """Its inside is the last solid, which is less than the ball of the bailout."""
         plane = {"center": [0, 0, 0.2], "normal": [0.3, 0.2, 1], "width": 3.2, "height": 3.2}
         scene = plane_scene("menger_sponge", (96, 96), iterations=3, plane=plane, colors=SMOOTH)
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         distance = reference.distance(scene.chain, pixel_points(scene).reshape(-1, 3), 3)[0].reshape(96, 96)
-        inside = (picture_of(film) == 0).all(axis=-1)
+        inside = (picture_of(framebuffer) == 0).all(axis=-1)
         assert (inside == (distance == 0)).mean() > 0.995
         assert 0.1 < inside.mean() < 0.9
 
@@ -221,10 +223,10 @@ class TestSolids:
         """|z| grows by 3 each time: after log(R / r) / log(3) applications, a fraction of one included, it is R."""
         formula = {**BALL, "map": ["3*x", "3*y", "3*z"]}
         scene = plane_scene(formula, (48, 48), iterations=20, plane={"width": 2, "height": 1}, colors=SMOOTH)
-        film = shoot(scene, device)
-        radius = np.hypot(film["P.X"], film["P.Y"]).astype(float)
+        framebuffer = shoot(scene, device)
+        radius = np.hypot(framebuffer["P.X"], framebuffer["P.Y"]).astype(float)
         expected = np.log(scene.chain.distance_bailout / radius) / np.log(3)
-        np.testing.assert_allclose(film["iterations"], expected, atol=1e-4)
+        np.testing.assert_allclose(framebuffer["iterations"], expected, atol=1e-4)
 
 
 class TestSamples:
@@ -241,24 +243,24 @@ class TestSamples:
             min_samples=64,
             noise=1e-3,
         )
-        film = shoot(scene, device)
-        radius = np.hypot(film["P.X"], film["P.Y"])
+        framebuffer = shoot(scene, device)
+        radius = np.hypot(framebuffer["P.X"], framebuffer["P.Y"])
         half_diagonal = 0.05 * np.sqrt(0.5)
-        assert (film["R"][radius < 0.8 - 2 * half_diagonal] == 1).all()
-        assert (film["R"][radius > 0.8 + 2 * half_diagonal] == 0).all()
-        assert film["R"].sum() * 0.05**2 == pytest.approx(np.pi * 0.64, rel=1e-3)
-        assert (film["samples"] == 64).all()
+        assert (framebuffer["R"][radius < 0.8 - 2 * half_diagonal] == 1).all()
+        assert (framebuffer["R"][radius > 0.8 + 2 * half_diagonal] == 0).all()
+        assert framebuffer["R"].sum() * 0.05**2 == pytest.approx(np.pi * 0.64, rel=1e-3)
+        assert (framebuffer["samples"] == 64).all()
 
     def test_noise_sends_samples_to_the_edge(self, device: Device) -> None:
         plane = {"center": [0, 0, 0.6], "width": 2, "height": 2}
         keys: dict[str, Any] = {"samples": 256, "noise": 0.02, "min_samples": 8, "filter": "tent"}
-        film = shoot(
+        framebuffer = shoot(
             plane_scene(BALL, (40, 40), iterations=4, plane=plane, colors=WHITE_DISK, **keys), device
         )
-        radius = np.hypot(film["P.X"], film["P.Y"])
+        radius = np.hypot(framebuffer["P.X"], framebuffer["P.Y"])
         far, near = np.abs(radius - 0.8) > 0.15, np.abs(radius - 0.8) < 0.02
-        assert (film["samples"][far] == 8).all()
-        assert film["samples"][near].mean() > 60
+        assert (framebuffer["samples"][far] == 8).all()
+        assert framebuffer["samples"][near].mean() > 60
 
 
 class TestPrecision:

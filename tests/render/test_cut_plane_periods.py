@@ -48,13 +48,13 @@ def test_the_picture_is_the_same_bit_for_bit(device: Device, case: str) -> None:
 
 def test_it_finds_most_of_them_soon(device: Device) -> None:
     plane = {"center": [-0.5, 0, 0], "width": 3, "height": 3}
-    film = shoot(
+    framebuffer = shoot(
         plane_scene(size=(96, 96), iterations=10_000, plane=plane, colors={"mode": "stepped"}), device
     )
-    inside = film["iterations"] == 10_000
+    inside = framebuffer["iterations"] == 10_000
     assert 0.15 < inside.mean() < 0.18  # of the area 9, that of the set is 1.5066
-    assert np.median(film["steps"][inside]) < 200
-    assert film["steps"][inside].mean() < 1000
+    assert np.median(framebuffer["steps"][inside]) < 200
+    assert framebuffer["steps"][inside].mean() < 1000
 
 
 def test_an_orbit_that_leaves_and_comes_back_is_inside_by_its_last_application(device: Device) -> None:
@@ -72,13 +72,13 @@ def test_an_orbit_that_leaves_and_comes_back_is_inside_by_its_last_application(d
     plane = {"width": 2, "height": 2}
     for iterations in range(30, 33):
         scene = plane_scene(formula, (64, 64), iterations=iterations, plane=plane, colors={"mode": "smooth"})
-        film = shoot(scene, device)
-        x, y = film["P.X"].astype(float), film["P.Y"].astype(float)
+        framebuffer = shoot(scene, device)
+        x, y = framebuffer["P.X"].astype(float), framebuffer["P.Y"].astype(float)
         radius = np.hypot(x, y)
         # Powers of two change nothing but the exponent: the orbits are exact.
         for _ in range(iterations):
             radius = radius * np.where(radius < 2.5, 4, 0.0625)
         sure = np.abs(radius - 2) > 1e-5
-        inside = (picture_of(film) == 0).all(axis=-1)
+        inside = (picture_of(framebuffer) == 0).all(axis=-1)
         np.testing.assert_array_equal(inside[sure], (radius <= 2)[sure])
         assert 0.01 < inside.mean() < 0.99

@@ -16,7 +16,7 @@ from clfractal.errors import FileError
 from clfractal.files.channels import NOISY, NORMAL
 from clfractal.files.exr import read_exr
 from clfractal.images.denoise import denoised
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import path, scene_of
 from tests.render.shots import engine_of
@@ -42,8 +42,8 @@ def bulb(samples: int = 2, **output: Any) -> Scene:
     )
 
 
-def colors(film: Film, names: tuple[str, ...] = COLORS) -> Floats:
-    return np.stack([film[name] for name in names], axis=-1)
+def colors(framebuffer: Framebuffer, names: tuple[str, ...] = COLORS) -> Floats:
+    return np.stack([framebuffer[name] for name in names], axis=-1)
 
 
 def error(picture: Floats, truth: Floats) -> float:
@@ -138,11 +138,11 @@ def test_what_fog_hides_keeps_no_grain(device: Device) -> None:
     """Where nothing but fog is seen, detail behind it is no reason to keep noise; of 400 samples the grain is 0.014."""
     names = ["R", "G", "B", *NOISY, *NORMAL]
     scene = clfractal.Scene(**{"version": 1, **FOGGED, "output": {"denoise": True, "channels": names}})
-    film = engine_of(device).render(scene)
+    framebuffer = engine_of(device).render(scene)
     hidden = np.s_[95:130, 22:80]
-    assert np.median(np.linalg.norm(colors(film, NORMAL)[hidden], axis=-1)) < 0.02
-    assert grain(colors(film, NOISY)[hidden]) > 0.08
-    assert grain(colors(film)[hidden]) < 0.015
+    assert np.median(np.linalg.norm(colors(framebuffer, NORMAL)[hidden], axis=-1)) < 0.02
+    assert grain(colors(framebuffer, NOISY)[hidden]) > 0.08
+    assert grain(colors(framebuffer)[hidden]) < 0.015
 
 
 @pytest.mark.parametrize("lamp", [0, 1e6])
@@ -163,13 +163,13 @@ def test_no_light_where_nothing_is(device: Device, lamp: float) -> None:
         output={"denoise": True, "channels": ["R", "G", "B", "A"]},
         **({"lights": lamps, "background": "transparent"} if lamp else dark),
     )
-    film = engine_of(device).render(scene)
-    nothing = film["A"] == 0
+    framebuffer = engine_of(device).render(scene)
+    nothing = framebuffer["A"] == 0
     assert 0.5 < nothing.mean() < 0.9
-    assert not colors(film)[nothing].any()
-    assert colors(film)[film["A"] == 1].mean() > 0.05
+    assert not colors(framebuffer)[nothing].any()
+    assert colors(framebuffer)[framebuffer["A"] == 1].mean() > 0.05
     alone = engine_of(device).render(scene, channels=["R", "G", "B"])
-    assert np.array_equal(colors(alone), colors(film))
+    assert np.array_equal(colors(alone), colors(framebuffer))
 
 
 def test_light_that_comes_by_chance_is_kept(device: Device) -> None:
@@ -182,10 +182,10 @@ def test_light_that_comes_by_chance_is_kept(device: Device) -> None:
         {"type": "point", "position": [-1.6, 0, 0], "intensity": 1, "falloff": "inverse_square"}
     ]
     values["fog"] = {"color": [0, 0, 0], "density": 0.4, "scattering": {}}
-    film = engine_of(device).render(Scene(**values))
-    unlucky = (film["A"] == 0) & (colors(film, NOISY) == 0).all(axis=-1)
+    framebuffer = engine_of(device).render(Scene(**values))
+    unlucky = (framebuffer["A"] == 0) & (colors(framebuffer, NOISY) == 0).all(axis=-1)
     assert unlucky.any()
-    assert (colors(film)[unlucky] > 0).mean() > 0.9
+    assert (colors(framebuffer)[unlucky] > 0).mean() > 0.9
 
 
 def test_each_eye_view_and_region(device: Device) -> None:
@@ -207,27 +207,31 @@ def test_each_eye_view_and_region(device: Device) -> None:
     assert np.abs(colors(part) - colors(whole)[8:48, 16:64]).mean() < 0.02
 
 
-def denoised_as(eye: Film, engine: Any, values: dict[str, Any], stereo: dict[str, Any], side: str) -> Floats:
+def denoised_as(
+    eye: Framebuffer, engine: Any, values: dict[str, Any], stereo: dict[str, Any], side: str
+) -> Floats:
     """What denoising makes of an eye's layers, which are rendered as a picture of that eye."""
     aids = [f"{name}.{part}" for name, parts in (("albedo", "RGB"), ("normal", "XYZ")) for part in parts]
     output = {"denoise": False, "channels": [*COLORS, *aids]}
-    film = engine.render(Scene(**{**values, "stereo": {**stereo, "mode": side}, "output": output}))
-    assert np.array_equal(colors(film), colors(eye, NOISY))
-    return denoised(colors(film), colors(film, tuple(aids[:3])), colors(film, tuple(aids[3:])))
+    framebuffer = engine.render(Scene(**{**values, "stereo": {**stereo, "mode": side}, "output": output}))
+    assert np.array_equal(colors(framebuffer), colors(eye, NOISY))
+    return denoised(
+        colors(framebuffer), colors(framebuffer, tuple(aids[:3])), colors(framebuffer, tuple(aids[3:]))
+    )
 
 
 def test_volumes_are_denoised_by_their_colours(device: Device) -> None:
     values = bulb(denoise=True).model_dump(mode="json", exclude_none=True)
     del values["lighting"]
     values["renderer"] = {"type": "volume", "resolution": 32, "samples": 1}
-    film = engine_of(device).render(Scene(**values))
+    framebuffer = engine_of(device).render(Scene(**values))
     values["output"] = {}
-    assert np.array_equal(colors(film), denoised(colors(engine_of(device).render(Scene(**values)))))
+    assert np.array_equal(colors(framebuffer), denoised(colors(engine_of(device).render(Scene(**values)))))
 
 
 def test_files_say_that_they_are_denoised(device: Device, tmp_path: Path) -> None:
-    film = engine_of(device).render(bulb(denoise=True, channels=["R", "G", "B", "A", *NOISY]))
-    film.save(tmp_path / "a.exr")
+    framebuffer = engine_of(device).render(bulb(denoise=True, channels=["R", "G", "B", "A", *NOISY]))
+    framebuffer.save(tmp_path / "a.exr")
     planes, header = read_exr(tmp_path / "a.exr")[:2]
     assert set(planes) == {"R", "G", "B", "A", *NOISY}
     assert header["clfractalDenoised"] == "Open Image Denoise"

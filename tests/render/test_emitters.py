@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
-from clfractal.shading.emitters import asked_radiance
+from clfractal.shading.emitters import sampled_radiance
 from tests.render.objects_oracle import NOWHERE, rotation_of
 from tests.render.shots import Floats, points_of, shoot, stacked
 from tests.scenes import scene_of
@@ -132,8 +132,8 @@ def test_a_ball_is_what_a_light_of_its_size_is(device: Device) -> None:
 
 @pytest.mark.parametrize("name", ["ball", "box", "panel", "drum", "tube"])
 def test_the_floor_has_the_irradiance_of_quadrature(device: Device, name: str) -> None:
-    film = shoot(lit({"it": lamp(name)}, 256), device)
-    found, points = stacked(film, ("R", "G", "B")).astype(float), points_of(film).reshape(-1, 3)
+    framebuffer = shoot(lit({"it": lamp(name)}, 256), device)
+    found, points = stacked(framebuffer, ("R", "G", "B")).astype(float), points_of(framebuffer).reshape(-1, 3)
     assert np.abs(points[:, 2]).max() < 1e-3
     if name == "ball":
         way = np.array(LAMPS["ball"]["position"]) - points
@@ -280,14 +280,14 @@ def test_what_is_asked_for() -> None:
         "part": {"material": "glow", "join": "smooth_union"},
     }
     scene = lit(objects, 1, materials=materials)
-    found = dict(zip(scene.objects, asked_radiance(scene), strict=True))
+    found = dict(zip(scene.objects, sampled_radiance(scene), strict=True))
     assert {name for name, radiance in found.items() if radiance is not None} == {"glow", "box", "cylinder"}
     assert found["glow"] == (6.0, 3.0, 1.5)
     direct = lit({"it": lamp("ball")}, 1, lighting={"mode": "direct"})
-    assert asked_radiance(direct) == [None, None]
+    assert sampled_radiance(direct) == [None, None]
     # Objects without a material have the scene's.
     named = lit({"it": {}}, 1, material={"name": "glow"})
-    assert asked_radiance(named)[1] == (6.0, 3.0, 1.5)
+    assert sampled_radiance(named)[1] == (6.0, 3.0, 1.5)
 
 
 def test_a_limit_holds_for_what_shines(device: Device) -> None:

@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 
 from clfractal.device.select import Device
 from clfractal.engine import drawing
-from clfractal.files.channels import MATTES, SURFACE_LAYERS
-from clfractal.images.film import Film
+from clfractal.files.channels import ID_CHANNELS, SURFACE_LAYERS
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.features import APART, CUT_PLANE, OF_MEDIA, SURFACE, VOLUME, Values, put_together
@@ -99,12 +99,14 @@ def with_nothing(kind: str, scene: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def channels(chosen: Mapping[str, str]) -> tuple[str, ...]:
-    return tuple(dict.fromkeys((*CHANNELS, *SURFACE_LAYERS, *MATTES))) if chosen.get("layers") else CHANNELS
+    return (
+        tuple(dict.fromkeys((*CHANNELS, *SURFACE_LAYERS, *ID_CHANNELS))) if chosen.get("layers") else CHANNELS
+    )
 
 
-def same(film: Film, other: Film, name: str) -> bool:
+def same(framebuffer: Framebuffer, other: Framebuffer, name: str) -> bool:
     """Equal bits, which tells 0 from -0."""
-    return film[name].tobytes() == other[name].tobytes()
+    return framebuffer[name].tobytes() == other[name].tobytes()
 
 
 @pytest.mark.parametrize(
@@ -147,7 +149,7 @@ def holds(
     assert more or whole["A"].max() > 0
 
     plan = plan_of(scene, device, channels=names)
-    parts = Film(plan.channels, SIZE, plan.region)
+    parts = Framebuffer(plan.channels, SIZE, plan.region)
     monkeypatch.setattr(drawing, "CAPACITY", 1)
     render_planned(scene, plan, device, parts, budget_seconds=2e-3)
     assert [name for name in names if not same(whole, parts, name)] == []

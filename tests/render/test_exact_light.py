@@ -56,7 +56,7 @@ def test_a_lamp_just_above_a_plane(device: Device, mode: str, detail: float, lan
         background=[0, 0, 0],
         **light_of(mode),
     )
-    film = shoot(scene, device, lanes=lanes)
+    framebuffer = shoot(scene, device, lanes=lanes)
     steps = 128 * size
     place = (np.arange(steps) + 0.5) / steps * side - side / 2
     x, y = np.meshgrid(place - 0.013, -place + 0.021)
@@ -65,7 +65,7 @@ def test_a_lamp_just_above_a_plane(device: Device, mode: str, detail: float, lan
     expected = light.reshape(size, 128, size, 128).mean((1, 3))
     # Beside the lamp, where as much light is missing as places are too high.
     beside = np.hypot(*np.meshgrid(np.arange(size) - 7.5, np.arange(size) - 7.5)) > 3
-    found = colors(film)[..., 0]
+    found = colors(framebuffer)[..., 0]
     assert found[beside].sum() == pytest.approx(expected[beside].sum(), rel=0.01)
     assert np.median(found[beside] / expected[beside]) == pytest.approx(1, abs=0.01)
 
@@ -118,9 +118,9 @@ def test_no_object_is_in_its_own_shadow(
             background=[0, 0, 0],
             **light_of(mode),
         )
-        film = shoot(scene, device, precision, lanes=lanes)
+        framebuffer = shoot(scene, device, precision, lanes=lanes)
         toward = -np.array(way) / math.sqrt(sum(each * each for each in way))
-        cosine = np.maximum(normals_of(film) @ toward, 0)
-        on_body = film["A"] == 1
+        cosine = np.maximum(normals_of(framebuffer) @ toward, 0)
+        on_body = framebuffer["A"] == 1
         assert on_body.sum() > 300
-        np.testing.assert_allclose(colors(film)[on_body][:, 0], cosine[on_body], atol=2e-3)
+        np.testing.assert_allclose(colors(framebuffer)[on_body][:, 0], cosine[on_body], atol=2e-3)

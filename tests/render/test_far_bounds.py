@@ -93,9 +93,9 @@ def test_what_is_farther_out_than_the_ball_is_seen(device: Device) -> None:
         (96, 96),
         renderer={"type": "surface", "bounds": {"center": [0, 0, 0], "radius": 30}},
     )
-    film = shoot(scene, device)
-    hit = film["A"] == 1
-    np.testing.assert_allclose(np.linalg.norm(points_of(film)[hit], axis=-1), 1, atol=0.01)
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
+    np.testing.assert_allclose(np.linalg.norm(points_of(framebuffer)[hit], axis=-1), 1, atol=0.01)
     shown = hit.mean() * (2 * 5 * np.tan(np.radians(15))) ** 2
     # The outline of a unit ball from 5 away.
     assert shown == pytest.approx(np.pi * 25 / 24, rel=0.03)

@@ -142,7 +142,7 @@ def test_a_program_has_the_same_kernels_for_all(feature: str, device: Device) ->
     assert all(other[name] == kernels for name, kernels in plain.items())
 
 
-def test_layers_and_mattes_are_data(device: Device) -> None:
+def test_layers_and_cryptomatte_are_data(device: Device) -> None:
     plain = texts(scene(FORMULA), device, channels=("R", "A"))
     assert (
         texts(scene(FORMULA), device, channels=("R", "albedo.R", "direct.G", "object", "CryptoObject00.R"))
@@ -300,8 +300,8 @@ def test_fifty_powers_need_one_compilation(device: Device, monkeypatch: pytest.M
     monkeypatch.setattr(program, "_built", counted)
     pictures, counts = set(), []
     for power in POWERS:
-        film = shoot_whole(scene({**FORMULA, "parameters": {"power": power}}, size=(16, 16)), device)
-        pictures.add(film["Z"].tobytes())
+        framebuffer = shoot_whole(scene({**FORMULA, "parameters": {"power": power}}, size=(16, 16)), device)
+        pictures.add(framebuffer["Z"].tobytes())
         counts.append(len(built))
     assert counts == counts[:1] * len(POWERS), "the first picture's programs are those of all"
     assert len(pictures) == len(POWERS)
@@ -357,7 +357,7 @@ LEFT: set[str] = set()
 # What is the same in every program: counts, sizes, and numbers of words.
 ALIKE = re.compile(
     r"(CHANNEL|KEPT|STATISTIC|OBJECT|MAP|LIGHT|TRAP|COLORING|ALONG|NORMAL|FEATURE|STATE|ALBEDO|SMOOTHEST|REPEATED)_\w+"
-    r"|TILE|PALETTE_SIZE|CHANNEL_COUNT|RAY_CHANNELS|MATTE_RANKS|STATISTICS|PASS_KEEP|PASS_ADD|WAVES|SPECTRUM_PLACES"
+    r"|TILE|PALETTE_SIZE|CHANNEL_COUNT|RAY_CHANNELS|CRYPTOMATTE_RANKS|STATISTICS|PASS_KEEP|PASS_ADD|WAVES|SPECTRUM_PLACES"
     r"|CHANNELS|(MODE|TABLE|TONE)_\w+|(GREY|LUMINANCE)_[RGB]|TRANSFER_SIZE|CLOUD_COLUMNS|MOST_MATERIALS|\w+_NUMBERS"
 )
 

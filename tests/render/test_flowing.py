@@ -43,15 +43,15 @@ def share_of_drop(points: Floats) -> Floats:
     return found
 
 
-def check(film: Any, scene: Scene, shown: Floats) -> None:
+def check(framebuffer: Any, scene: Scene, shown: Floats) -> None:
     """The picture has the blended colours, and some that are neither's."""
     origin, direction, _ = rays(scene)
 
     def distance(points: Floats) -> Floats:
         return smooth(np.maximum(solids(points), 0), a_sphere(PLACE, RADIUS)(points), WIDTH)
 
-    met = np.isfinite(marched(distance, origin, direction)) & (film["A"] == 1)
-    share = share_of_drop(points_of(film))[met][:, None]
+    met = np.isfinite(marched(distance, origin, direction)) & (framebuffer["A"] == 1)
+    share = share_of_drop(points_of(framebuffer))[met][:, None]
     assert ((share > 0.2) & (share < 0.8)).sum() > 200
     off = np.abs(shown[met] - (OWN + share * (DROP - OWN))).max(axis=-1)
     # Colours are those of the place where light is computed, some footprints before the surface.
@@ -60,8 +60,8 @@ def check(film: Any, scene: Scene, shown: Floats) -> None:
     assert np.percentile(off, 97) < 0.15
 
 
-def colors(film: Any) -> Floats:
-    return np.stack([film[name] for name in "RGB"], axis=-1).astype(float)
+def colors(framebuffer: Any) -> Floats:
+    return np.stack([framebuffer[name] for name in "RGB"], axis=-1).astype(float)
 
 
 def test_colours_are_blended(device: Device) -> None:
@@ -73,8 +73,8 @@ def test_colours_are_blended(device: Device) -> None:
         # From behind: ambient light alone.
         lights=[{"type": "directional", "direction": [1.5, -2.5, 1.2]}],
     )
-    film = shoot(scene, device)
-    check(film, scene, colors(film))
+    framebuffer = shoot(scene, device)
+    check(framebuffer, scene, colors(framebuffer))
 
 
 def test_materials_are_blended_along_paths(device: Device) -> None:
@@ -90,8 +90,8 @@ def test_materials_are_blended_along_paths(device: Device) -> None:
         background=[0, 0, 0],
         lighting={"mode": "path", "bounces": 0},
     )
-    film = shoot(scene, device)
-    check(film, scene, colors(film))
+    framebuffer = shoot(scene, device)
+    check(framebuffer, scene, colors(framebuffer))
 
 
 @pytest.mark.parametrize("by", one_of("iterations", "trap"))
@@ -120,9 +120,9 @@ def test_counts_and_traps_are_between_those_of_both(device: Device, by: str) -> 
         material=LIT,
         lights=[{"type": "directional", "direction": [0, -1, 0], "shadow": False}],
     )
-    film = shoot(scene, device)
-    hit = film["A"] == 1
-    grey, deep = film["R"].astype(float), np.where(hit, film["Z"], 100).astype(float)
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
+    grey, deep = framebuffer["R"].astype(float), np.where(hit, framebuffer["Z"], 100).astype(float)
     # Single pixels where counts are noise do not matter; nor do outlines, where the colour may jump.
     around = sliding_window_view(grey, (5, 5)).reshape(76, 124, 25)
     smooth_grey = np.median(around, axis=-1)

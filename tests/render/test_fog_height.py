@@ -52,12 +52,12 @@ CASES: list[dict[str, Any]] = [
 @pytest.mark.parametrize("values", CASES)
 def test_what_comes_through_is_the_integral(device: Device, values: dict[str, Any], precision: str) -> None:
     scene = scene_with(precision, **values)
-    film = shoot(scene, device)
-    seen = stacked(film, ("R", "G", "B")).astype(float)
+    framebuffer = shoot(scene, device)
+    seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
     origin = np.broadcast_to(origin, way.shape)
     distance, nearest = to_sphere(origin, way, [0, 0, 0], BALL_RADIUS)
-    inner = (film["A"] == 1) & (nearest < 0.98 * BALL_RADIUS)
+    inner = (framebuffer["A"] == 1) & (nearest < 0.98 * BALL_RADIUS)
     assert inner.sum() > 300
     through = np.exp(-depth(origin[inner], way[inner], distance[inner], scene.fog))[:, None]
     np.testing.assert_allclose(seen[inner], RED * through + MIST * (1 - through), atol=0.002)
@@ -67,13 +67,13 @@ def test_what_comes_through_is_the_integral(device: Device, values: dict[str, An
 def test_the_sky_comes_through_above(device: Device, values: dict[str, Any]) -> None:
     """As far as one sees up; down there is no end of it."""
     scene = scene_with(**values)
-    film = shoot(scene, device)
-    seen = stacked(film, ("R", "G", "B")).astype(float)
+    framebuffer = shoot(scene, device)
+    seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
     origin = np.broadcast_to(origin, way.shape)
     fog: Any = scene.fog
     rise = way @ (np.array(fog.up) / np.linalg.norm(fog.up))
-    up, down = (film["A"] == 0) & (rise > 0.02), (film["A"] == 0) & (rise <= 0)
+    up, down = (framebuffer["A"] == 0) & (rise > 0.02), (framebuffer["A"] == 0) & (rise <= 0)
     np.testing.assert_allclose(seen[down], np.broadcast_to(MIST, seen[down].shape), atol=1e-5)
     # Far enough that nothing of the fog is left.
     far = 40 * fog.height / rise[up]

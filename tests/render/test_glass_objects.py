@@ -186,7 +186,7 @@ def test_sets_that_are_no_glass_have_no_march_within() -> None:
     found = scene({"ball": {"type": "sphere", "material": "glass"}}, {"glass": glass()})
     plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
     names = [text.name for text in program_texts(found, plan)]
-    assert names == ["rays", "begin", "spots", "objects", "scatter", "gather"]
+    assert names == ["rays", "begin", "interactions", "objects", "scatter", "gather"]
 
 
 @pytest.mark.parametrize(

@@ -125,7 +125,7 @@ def test_scenes_without_glass_do_not_know_it() -> None:
     for scene in scenes:
         plan = make_plan(scene, precision="float32", lanes=4, channels=("R", "G", "B"))
         found = program_texts(scene, plan)
-        assert [text.name for text in found] == ["rays", "begin", "spots", "scatter", "gather"]
+        assert [text.name for text in found] == ["rays", "begin", "interactions", "scatter", "gather"]
         texts.append([text.flat.text for text in found])
     assert texts[0] == texts[1]
 

@@ -13,7 +13,7 @@ from scipy import ndimage
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
 from clfractal.formulas.language import Chain
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.points import escape
 from tests.render.shots import Floats, points_of, shoot
@@ -31,7 +31,7 @@ Bools = npt.NDArray[np.bool_]
 
 def from_above(
     device: Device, x: float, y: float, height: float, side: int
-) -> tuple[Film, Floats, Floats, Chain]:
+) -> tuple[Framebuffer, Floats, Floats, Chain]:
     """The picture, and x and y of its columns and rows."""
     camera: dict[str, Any] = {
         "projection": "orthographic",
@@ -104,13 +104,13 @@ def point_inside(
 def test_the_issue_of_the_thesis(device: Device) -> None:
     """At 1000 x 1000: nothing of the Mandelbrot set is missing, all of the picture hangs together, or is there."""
     side, height = 1000, 3.0
-    film, columns, rows, chain = from_above(device, -0.6, 0, height, side)
-    covered, inside = film["A"] > 0, mandelbrot(columns, rows)
+    framebuffer, columns, rows, chain = from_above(device, -0.6, 0, height, side)
+    covered, inside = framebuffer["A"] > 0, mandelbrot(columns, rows)
     assert 0.16 < inside.mean() < 0.18  # its area, 1.5066, over the picture's, and 250 iterations' excess
     assert (inside & ~covered).sum() <= LOST * inside.sum()
     labels, sizes = components(covered)
     assert sizes[0] >= 0.999 * covered.sum()
-    points = points_of(film)
+    points = points_of(framebuffer)
     empty = {}
     for island in range(2, len(sizes) + 1):
         r, c = np.nonzero(labels == island)
@@ -125,9 +125,9 @@ def test_the_issue_of_the_thesis(device: Device) -> None:
 def test_a_ray_whose_own_line_meets_the_set_hits(device: Device, x: float, side: int) -> None:
     """The set is a sheet without thickness there. Over its left globe lie layers in which distances are much too large;
     ten pixels of 128,000 were lost in them."""
-    film, columns, rows, _ = from_above(device, x, 0, 3.1, side)
+    framebuffer, columns, rows, _ = from_above(device, x, 0, 3.1, side)
     inside = mandelbrot(columns, rows)
-    assert (inside & (film["A"] == 0)).sum() <= LOST * inside.sum()
+    assert (inside & (framebuffer["A"] == 0)).sum() <= LOST * inside.sum()
 
 
 @pytest.mark.parametrize(
@@ -138,8 +138,8 @@ def test_a_ray_whose_own_line_meets_the_set_hits(device: Device, x: float, side:
 def test_no_luck_of_one_framing(device: Device, x: float, y: float, height: float, share: float) -> None:
     """Other pixel places, and close views. Around the needle the set is a dust of specks finer than a pixel on threads
     without thickness: there one centre in a thousand may be missed, and small parts may look loose."""
-    film, columns, rows, _ = from_above(device, x, y, height, 400)
-    covered, inside = film["A"] > 0, mandelbrot(columns, rows)
+    framebuffer, columns, rows, _ = from_above(device, x, y, height, 400)
+    covered, inside = framebuffer["A"] > 0, mandelbrot(columns, rows)
     assert inside.sum() > 2000
     assert (inside & ~covered).sum() <= 1e-3 * inside.sum()
     assert components(covered)[1][0] >= share * covered.sum()

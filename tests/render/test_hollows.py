@@ -98,7 +98,7 @@ def test_shadows_in_a_hollow(device: Device, lamp: list[float]) -> None:
         lights=[{"type": "point", "position": lamp}],
         material={"color": [1, 1, 1], "ambient": 0, "diffuse": 1, "specular": 0},
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, footprint = rays(scene)
     t = marched(hollowed, origin, direction)
     met = np.isfinite(t)
@@ -115,8 +115,8 @@ def test_shadows_in_a_hollow(device: Device, lamp: list[float]) -> None:
     plain = met & ~beside_a_rim(met) & ~beside_a_rim(lit) & (np.abs(facing) > 0.15)
     assert (plain & lit).sum() > 500
     assert (plain & ~lit).sum() > 100
-    assert ((film["R"] > 0)[plain] == lit[plain]).mean() > 0.99
-    np.testing.assert_allclose(np.median(film["R"][plain & lit] / facing[plain & lit]), 1, atol=0.01)
+    assert ((framebuffer["R"] > 0)[plain] == lit[plain]).mean() > 0.99
+    np.testing.assert_allclose(np.median(framebuffer["R"][plain & lit] / facing[plain & lit]), 1, atol=0.01)
 
 
 def mould(**sections: Any) -> Scene:
@@ -145,12 +145,12 @@ def ways(scene: Scene, t: Floats, direction: Floats, origin: Floats, width: Floa
 def test_a_mould_of_a_fractal(device: Device) -> None:
     """Every hit has the set within a footprint, and no ray goes through three footprints of it before."""
     scene = mould(renderer={"type": "surface", "step": 0.01})
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, footprint = rays(scene)
-    hit = (film["A"] == 1) & ~beside_a_rim(film["A"] == 1)
+    hit = (framebuffer["A"] == 1) & ~beside_a_rim(framebuffer["A"] == 1)
     chosen = np.flatnonzero(hit)[:: max(1, int(hit.sum() // 1500))]
     o, d = origin.reshape(-1, 3)[chosen], direction.reshape(-1, 3)[chosen]
-    t = np.linalg.norm(points_of(film).reshape(-1, 3)[chosen] - o, axis=-1)
+    t = np.linalg.norm(points_of(framebuffer).reshape(-1, 3)[chosen] - o, axis=-1)
     width = footprint.reshape(-1)[chosen] * t
     around = t[:, None] + width[:, None] * np.linspace(-0.1, 1, 45)
     assert ways(scene, around, d, o, width).any(axis=1).mean() > 0.99
@@ -159,7 +159,7 @@ def test_a_mould_of_a_fractal(device: Device) -> None:
     within = ways(scene, before, d, o, width)
     thick = np.logical_and.reduce([within[:, i : within.shape[1] - 9 + i] for i in range(9)])
     assert thick.any(axis=1).sum() == 0
-    walls = np.linalg.norm(points_of(film).reshape(-1, 3)[chosen] - [0, -1, 0.5], axis=-1) < 1.15
+    walls = np.linalg.norm(points_of(framebuffer).reshape(-1, 3)[chosen] - [0, -1, 0.5], axis=-1) < 1.15
     assert walls.sum() > 300
-    facing = (normals_of(film).reshape(-1, 3)[chosen] * d).sum(-1)
+    facing = (normals_of(framebuffer).reshape(-1, 3)[chosen] * d).sum(-1)
     assert (facing[walls] < 0.11).all()

@@ -12,7 +12,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.engine.job import Job
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
 from tests.render.job_scenes import SCENES, lit_by_a_file, scene_of
@@ -29,23 +29,23 @@ WORKER = """
 import pickle, sys
 import numpy as np
 from clfractal.device.select import by_key
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
 job = pickle.load(sys.stdin.buffer)
-films = JobFilms(job)
-run(job, films.films, LocalExecutor(by_key(job.device.index, job.device.key)))
-film = films.picture()
-np.savez(sys.argv[1], **{name: film[name] for name in film})
+framebuffers = JobFramebuffers(job)
+run(job, framebuffers.framebuffers, LocalExecutor(by_key(job.device.index, job.device.key)))
+framebuffer = framebuffers.picture()
+np.savez(sys.argv[1], **{name: framebuffer[name] for name in framebuffer})
 """
 
 
 def rendered(job: Job, device: Device) -> Bits:
     """By an executor that has never seen anything."""
-    films = JobFilms(job)
-    run(job, films.films, LocalExecutor(device))
-    film = films.picture()
-    return {name: film[name].view(np.uint32) for name in film}
+    framebuffers = JobFramebuffers(job)
+    run(job, framebuffers.framebuffers, LocalExecutor(device))
+    framebuffer = framebuffers.picture()
+    return {name: framebuffer[name].view(np.uint32) for name in framebuffer}
 
 
 def same(found: Bits, expected: Bits) -> None:

@@ -14,7 +14,7 @@ from clfractal.device.select import Device
 from clfractal.engine.job import Job
 from clfractal.engine.prepare import prepare
 from clfractal.errors import FileError
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.scene.model import Scene
 from tests.render.job_scenes import SCENES, scene_of
 
@@ -25,8 +25,8 @@ def identity(scene: Scene, device: Device, **settings: Any) -> dict[str, Any]:
     return prepare(scene, device, **{"precision": "float32", **settings}).identity(0)
 
 
-def begin(path: Path, known_by: Mapping[str, Any], *, resume: bool) -> JournalFilm:
-    return JournalFilm(path, known_by, ("A",), (32, 32), resume=resume)
+def begin(path: Path, known_by: Mapping[str, Any], *, resume: bool) -> JournalFramebuffer:
+    return JournalFramebuffer(path, known_by, ("A",), (32, 32), resume=resume)
 
 
 def with_lanes(job: Job) -> dict[str, Any]:

@@ -174,11 +174,13 @@ def test_walls_have_their_own_colour_and_light_along_paths(device: Device) -> No
         lighting={"mode": "path", "bounces": 2},
         renderer={"type": "surface", "samples": 16},
     )
-    film = shoot(scene, device, samples=16)
+    framebuffer = shoot(scene, device, samples=16)
     middle = (slice(13, 19), slice(13, 19))
-    assert (film["A"][middle] == 1).all()
-    np.testing.assert_allclose(points_of(film)[middle][..., 2], 0, atol=2e-3)
-    np.testing.assert_allclose(normals_of(film)[middle], np.broadcast_to([0, 0, 1], (6, 6, 3)), atol=1e-2)
+    assert (framebuffer["A"][middle] == 1).all()
+    np.testing.assert_allclose(points_of(framebuffer)[middle][..., 2], 0, atol=2e-3)
+    np.testing.assert_allclose(
+        normals_of(framebuffer)[middle], np.broadcast_to([0, 0, 1], (6, 6, 3)), atol=1e-2
+    )
 
 
 def twin_of(formula: dict[str, Any], camera: dict[str, Any], **sections: Any) -> tuple[Any, Any]:
@@ -233,12 +235,12 @@ def test_both_eyes_and_all_views_of_it(device: Device) -> None:
         objects={"hole": {**SIMPLE["sphere"][0], "join": "cut"}},
         layout={"columns": 2, "views": views},
     )
-    film = shoot_whole(scene, device)
+    framebuffer = shoot_whole(scene, device)
     whole = shoot_whole(scene_of(BALL, PERSPECTIVE, (48, 48), objects={}), device)
-    left = film["Z"][:, :48]
+    left = framebuffer["Z"][:, :48]
     seen = np.isfinite(left) & np.isfinite(whole["Z"])
     assert (left[seen] - whole["Z"][seen] > 0.2).sum() > 20, "the hole is seen"
-    assert (film["A"][:, 50:] == 1).all()
+    assert (framebuffer["A"][:, 50:] == 1).all()
 
 
 def test_a_moving_formula_compiles_once(device: Device) -> None:

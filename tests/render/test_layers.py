@@ -14,7 +14,7 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
 from clfractal.files.channels import ALBEDO, LIGHT_LAYERS, NORMAL, RAY_CHANNELS, SURFACE_LAYERS
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.passes import kept_numbers
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import BLACK, path, scene_of
@@ -32,7 +32,7 @@ SUN = {"direction": [-1, 1, -1], "intensity": 2}
 HOLLOW = {"name": "menger_sponge", "iterations": 3}
 
 
-def rendered(material: dict[str, Any], *, samples: int = 8, **sections: Any) -> Film:
+def rendered(material: dict[str, Any], *, samples: int = 8, **sections: Any) -> Framebuffer:
     """The picture with all channels, of `scene_of` with a material."""
     renderer = {"samples": samples, **sections.pop("renderer", {})}
     values = {"lighting": path(3), "lights": [SUN], "renderer": renderer, **sections}
@@ -40,15 +40,15 @@ def rendered(material: dict[str, Any], *, samples: int = 8, **sections: Any) -> 
     return clfractal.render(scene, channels=[*RAY_CHANNELS, *SURFACE_LAYERS])
 
 
-def layer(film: Film, name: str, parts: str = "RGB") -> Floats:
+def layer(framebuffer: Framebuffer, name: str, parts: str = "RGB") -> Floats:
     """A layer, shape (height, width, 3); the picture itself if the name is empty."""
     names = [f"{name}.{part}" if name else part for part in parts]
-    return np.stack([film[each] for each in names], axis=-1).astype(np.float64)
+    return np.stack([framebuffer[each] for each in names], axis=-1).astype(np.float64)
 
 
-def light(film: Film) -> Floats:
+def light(framebuffer: Framebuffer) -> Floats:
     """The sum of the three layers of light."""
-    return layer(film, "emission") + layer(film, "direct") + layer(film, "indirect")
+    return layer(framebuffer, "emission") + layer(framebuffer, "direct") + layer(framebuffer, "indirect")
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
@@ -58,35 +58,37 @@ def test_the_layers_of_light_are_the_picture(formula: dict[str, Any] | None, pre
     more: dict[str, Any] = (
         {} if formula is None else {"formula": formula, "camera": {"position": [2, -3, 1.5], "fov": 40}}
     )
-    film = rendered(GLOWING, background="transparent", renderer={"precision": precision}, **more)
-    whole = layer(film, "")
+    framebuffer = rendered(GLOWING, background="transparent", renderer={"precision": precision}, **more)
+    whole = layer(framebuffer, "")
     assert whole.max() > 0.5
-    assert np.abs(light(film) - whole).max() < 2e-6 * whole.max()
-    indirect = layer(film, "indirect")
+    assert np.abs(light(framebuffer) - whole).max() < 2e-6 * whole.max()
+    indirect = layer(framebuffer, "indirect")
     assert indirect.min() >= 0
-    assert layer(film, "direct").min() >= 0
+    assert layer(framebuffer, "direct").min() >= 0
     if formula is not None:
         assert indirect.max() > 0.05
 
 
 def test_the_rest_is_the_background() -> None:
-    film = rendered(GLOWING, background={"top": [0.3, 0.4, 0.5], "bottom": [0.3, 0.4, 0.5]})
-    rest = layer(film, "") - light(film)
-    assert np.allclose(rest, (1 - film["A"][..., None]) * [0.3, 0.4, 0.5], atol=2e-6)
-    assert 0 < film["A"].mean() < 1
+    framebuffer = rendered(GLOWING, background={"top": [0.3, 0.4, 0.5], "bottom": [0.3, 0.4, 0.5]})
+    rest = layer(framebuffer, "") - light(framebuffer)
+    assert np.allclose(rest, (1 - framebuffer["A"][..., None]) * [0.3, 0.4, 0.5], atol=2e-6)
+    assert 0 < framebuffer["A"].mean() < 1
 
 
 def test_fog_dims_the_layers_like_the_picture() -> None:
     """Black fog takes light away and brings none."""
-    film = rendered(GLOWING, background="transparent", fog={"color": [0, 0, 0], "density": 0.4})
+    framebuffer = rendered(GLOWING, background="transparent", fog={"color": [0, 0, 0], "density": 0.4})
     clear = rendered(GLOWING, background="transparent")
-    assert np.allclose(light(film), layer(film, ""), atol=2e-6)
-    full = film["A"] == 1
-    assert (light(film)[full].sum(axis=-1) < 0.6 * light(clear)[full].sum(axis=-1)).all()
+    assert np.allclose(light(framebuffer), layer(framebuffer, ""), atol=2e-6)
+    full = framebuffer["A"] == 1
+    assert (light(framebuffer)[full].sum(axis=-1) < 0.6 * light(clear)[full].sum(axis=-1)).all()
     # Emission is the same everywhere, so it tells what comes through.
-    comes = layer(film, "emission")[full][:, :1] / layer(clear, "emission")[full][:, :1]
+    comes = layer(framebuffer, "emission")[full][:, :1] / layer(clear, "emission")[full][:, :1]
     for name, parts in (("albedo", "RGB"), ("normal", "XYZ")):
-        assert np.allclose(layer(film, name, parts)[full], comes * layer(clear, name, parts)[full], atol=1e-3)
+        assert np.allclose(
+            layer(framebuffer, name, parts)[full], comes * layer(clear, name, parts)[full], atol=1e-3
+        )
 
 
 def test_a_plane_in_front_dims_the_layers_like_the_picture() -> None:
@@ -94,16 +96,16 @@ def test_a_plane_in_front_dims_the_layers_like_the_picture() -> None:
     black = {"palette": ["#000000", "#000000"], "inside": [0, 0, 0]}
     place = {"center": [1, -2, 0], "normal": [0, -1, 0], "width": 2, "height": 4}
     quad = {"plane": place, "colors": black, "opacity": 0.6}
-    film = rendered(GLOWING, background="transparent", cut_planes=[quad])
+    framebuffer = rendered(GLOWING, background="transparent", cut_planes=[quad])
     clear = rendered(GLOWING, background="transparent")
-    assert np.allclose(light(film), layer(film, ""), atol=2e-6)
+    assert np.allclose(light(framebuffer), layer(framebuffer, ""), atol=2e-6)
     assert layer(clear, "")[:, 26:].max() > 0.5
     for name in ("", "albedo", "direct", "indirect", "emission"):
-        assert np.allclose(layer(film, name)[:, 26:], 0.4 * layer(clear, name)[:, 26:], atol=1e-5)
+        assert np.allclose(layer(framebuffer, name)[:, 26:], 0.4 * layer(clear, name)[:, 26:], atol=1e-5)
 
 
 def test_layers_change_no_bit_of_the_picture() -> None:
-    film = rendered(GLOWING, background=SKY)
+    framebuffer = rendered(GLOWING, background=SKY)
     scene = scene_of(
         materials={"m": GLOWING},
         material={"name": "m"},
@@ -114,36 +116,36 @@ def test_layers_change_no_bit_of_the_picture() -> None:
     )
     plain = clfractal.render(scene, channels=RAY_CHANNELS)
     for name in RAY_CHANNELS:
-        np.testing.assert_array_equal(film[name], plain[name])
+        np.testing.assert_array_equal(framebuffer[name], plain[name])
 
 
 def test_emission_is_what_the_material_shines_with() -> None:
-    film = rendered(GLOWING, background=BLACK, lights=[])
-    full = film["A"] == 1
-    assert np.allclose(layer(film, "emission")[full], SHINES, rtol=1e-6)
+    framebuffer = rendered(GLOWING, background=BLACK, lights=[])
+    full = framebuffer["A"] == 1
+    assert np.allclose(layer(framebuffer, "emission")[full], SHINES, rtol=1e-6)
     # A ball lights nothing of itself.
-    assert not layer(film, "direct")[full].any()
+    assert not layer(framebuffer, "direct")[full].any()
 
 
 def test_direct_light_of_a_sun_is_lamberts() -> None:
     """A matt ball under one sun: colour x intensity x cosine, and nothing more."""
-    film = rendered(CLAY, background=BLACK, samples=1)
+    framebuffer = rendered(CLAY, background=BLACK, samples=1)
     toward = np.array([1, -1, 1]) / math.sqrt(3)
-    cosine = np.clip(layer(film, "N", "XYZ") @ toward, 0, None)
-    full = (film["A"] == 1) & (cosine > 0.05)
+    cosine = np.clip(layer(framebuffer, "N", "XYZ") @ toward, 0, None)
+    full = (framebuffer["A"] == 1) & (cosine > 0.05)
     wanted = 2 * cosine[..., None] * [0.6, 0.3, 0.1]
     assert full.sum() > 200
-    assert np.allclose(layer(film, "direct")[full], wanted[full], rtol=2e-3)
-    assert not layer(film, "emission").any()
+    assert np.allclose(layer(framebuffer, "direct")[full], wanted[full], rtol=2e-3)
+    assert not layer(framebuffer, "emission").any()
 
 
 def test_what_a_sky_brings_is_direct() -> None:
     """A white sky lights a matt ball as brightly from everywhere: its colour. Found by chance, at the next spot."""
     white = {"top": [1, 1, 1], "bottom": [1, 1, 1]}
-    film = rendered(CLAY, background=white, lights=[], lighting=path(0), samples=64)
-    full = film["A"] == 1
-    assert np.allclose(layer(film, "direct")[full].mean(axis=0), [0.6, 0.3, 0.1], rtol=5e-3)
-    assert not layer(film, "indirect")[full].any()
+    framebuffer = rendered(CLAY, background=white, lights=[], lighting=path(0), samples=64)
+    full = framebuffer["A"] == 1
+    assert np.allclose(layer(framebuffer, "direct")[full].mean(axis=0), [0.6, 0.3, 0.1], rtol=5e-3)
+    assert not layer(framebuffer, "indirect")[full].any()
 
 
 @pytest.mark.parametrize(
@@ -158,32 +160,32 @@ def test_what_a_sky_brings_is_direct() -> None:
     ],
 )
 def test_albedo_is_the_materials(material: dict[str, Any], albedo: tuple[float, float, float]) -> None:
-    film = rendered(material, background=SKY, samples=4)
-    cover = film["A"][..., None]
-    assert np.allclose(layer(film, "albedo"), cover * albedo, atol=1e-5)
+    framebuffer = rendered(material, background=SKY, samples=4)
+    cover = framebuffer["A"][..., None]
+    assert np.allclose(layer(framebuffer, "albedo"), cover * albedo, atol=1e-5)
     assert cover.max() == 1
 
 
 def test_albedo_without_paths_is_the_surfaces_colour() -> None:
     for coloring in ({}, {"by": "normal"}):
         scene = scene_of(material={"color": [0.8, 0.5, 0.2]}, coloring=coloring, renderer={"samples": 1})
-        film = clfractal.render(scene, channels=["A", "N.X", "N.Y", "N.Z", *ALBEDO, *NORMAL])
-        full = film["A"] == 1
-        found = layer(film, "albedo")[full]
+        framebuffer = clfractal.render(scene, channels=["A", "N.X", "N.Y", "N.Z", *ALBEDO, *NORMAL])
+        full = framebuffer["A"] == 1
+        found = layer(framebuffer, "albedo")[full]
         if coloring:
             assert found.std(axis=0).max() > 0.1
         else:
             assert np.allclose(found, [0.8, 0.5, 0.2], atol=1e-6)
-        assert np.array_equal(layer(film, "normal", "XYZ"), layer(film, "N", "XYZ"))
+        assert np.array_equal(layer(framebuffer, "normal", "XYZ"), layer(framebuffer, "N", "XYZ"))
 
 
 def test_a_lamp_that_is_seen_is_emission_and_white() -> None:
     lamp = {"type": "sphere", "position": [0, -2.5, 0], "radius": 0.3, "intensity": 3}
-    film = rendered(CLAY, background=BLACK, lights=[lamp], samples=4)
+    framebuffer = rendered(CLAY, background=BLACK, lights=[lamp], samples=4)
     middle = (24, 24)
-    assert np.allclose(layer(film, "emission")[middle], 3, rtol=1e-5)
-    assert np.allclose(layer(film, "albedo")[middle], 1)
-    assert not layer(film, "direct")[middle].any()
+    assert np.allclose(layer(framebuffer, "emission")[middle], 3, rtol=1e-5)
+    assert np.allclose(layer(framebuffer, "albedo")[middle], 1)
+    assert not layer(framebuffer, "direct")[middle].any()
 
 
 @pytest.mark.combination
@@ -250,12 +252,12 @@ def test_the_glow_is_light_that_is_seen_at_once(device: Device, lanes: int, mist
         renderer={"samples": 4, "points": {"count": points, "pattern": "grid"}},
         **more,
     )
-    film = shoot(scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS), lanes=lanes)
-    whole = layer(film, "")
-    assert np.abs(light(film) - whole).max() < 1e-5 * whole.max()
-    nothing = film["A"] == 0
+    framebuffer = shoot(scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS), lanes=lanes)
+    whole = layer(framebuffer, "")
+    assert np.abs(light(framebuffer) - whole).max() < 1e-5 * whole.max()
+    nothing = framebuffer["A"] == 0
     assert whole[nothing].max() > 0.03
-    np.testing.assert_allclose(layer(film, "emission")[nothing], whole[nothing], atol=1e-6)
+    np.testing.assert_allclose(layer(framebuffer, "emission")[nothing], whole[nothing], atol=1e-6)
 
 
 def test_light_before_and_behind_planes_is_dimmed_by_them(device: Device) -> None:
@@ -273,6 +275,6 @@ def test_light_before_and_behind_planes_is_dimmed_by_them(device: Device) -> Non
     without = shoot(
         scene.model_copy(update={"cut_planes": []}), device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS)
     )
-    film = shoot(scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS))
+    framebuffer = shoot(scene, device, channels=(*RAY_CHANNELS, *SURFACE_LAYERS))
     through = np.where(without["A"] == 1, 0.5, 0.375)[..., None]
-    np.testing.assert_allclose(light(film), light(without) * through, atol=1e-4)
+    np.testing.assert_allclose(light(framebuffer), light(without) * through, atol=1e-4)

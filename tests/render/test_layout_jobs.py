@@ -12,7 +12,7 @@ import clfractal
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.engine.run import Progress
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.layout import Place
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -37,18 +37,18 @@ def for_two_eyes() -> Scene:
     return load_scene({**plain, "stereo": {"mode": "split", "separation": 0.5}})
 
 
-def same(found: Film, expected: Film) -> None:
+def same(found: Framebuffer, expected: Framebuffer) -> None:
     """All channels bit for bit."""
     assert found.channels == expected.channels
     for name in expected:
         np.testing.assert_array_equal(found[name].view(np.uint32), expected[name].view(np.uint32), name)
 
 
-def counted(device: Device, scene: Scene, **settings: Any) -> tuple[Film, Progress]:
+def counted(device: Device, scene: Scene, **settings: Any) -> tuple[Framebuffer, Progress]:
     """The picture, and what it took."""
     seen: list[Progress] = []
-    film = engine_of(device).render(scene, seen.append, channels=CHANNELS, **settings)
-    return film, seen[-1]
+    framebuffer = engine_of(device).render(scene, seen.append, channels=CHANNELS, **settings)
+    return framebuffer, seen[-1]
 
 
 class TestHeader:
@@ -100,7 +100,7 @@ class TestHeader:
 
 
 @pytest.fixture(scope="module")
-def whole(device: Device) -> Film:
+def whole(device: Device) -> Framebuffer:
     """The layout in one go."""
     return counted(device, layout())[0]
 
@@ -123,17 +123,17 @@ class TestRegion:
     def test_it_is_the_part_of_the_whole(
         self,
         device: Device,
-        whole: Film,
+        whole: Framebuffer,
         region: tuple[int, int, int, int],
         tiles: int,
     ) -> None:
         """And only the tiles that it shows are rendered, of the views that it shows; rays are those of its pixels."""
         x, y, width, height = region
-        film, state = counted(device, layout(), region=region)
-        assert (film.display, film["R"].shape) == (SIZE, (height, width))
+        framebuffer, state = counted(device, layout(), region=region)
+        assert (framebuffer.display, framebuffer["R"].shape) == (SIZE, (height, width))
         for name in CHANNELS:
             cut = np.ascontiguousarray(whole[name][y : y + height, x : x + width])
-            np.testing.assert_array_equal(film[name].view(np.uint32), cut.view(np.uint32), name)
+            np.testing.assert_array_equal(framebuffer[name].view(np.uint32), cut.view(np.uint32), name)
         assert (state.tiles, state.tiles_done, state.tiles_before) == (tiles, tiles, 0)
         shown = np.zeros(SIZE[::-1], int)
         for place, samples in zip(PLACES, (1, 1, 2), strict=True):
@@ -143,11 +143,13 @@ class TestRegion:
     def test_a_gap_alone(self, device: Device, tmp_path: Any) -> None:
         """Nothing is rendered, and it can be written, and shown again."""
         seen: list[Progress] = []
-        film = engine_of(device).render(layout(), seen.append, region=(44, 3, 4, 50), channels=CHANNELS)
+        framebuffer = engine_of(device).render(
+            layout(), seen.append, region=(44, 3, 4, 50), channels=CHANNELS
+        )
         assert seen == []
-        assert [set(film[name].flat) for name in "RGB"] == [{value} for value in GAP]
-        assert set(film["A"].flat) == {1}
-        film.save(tmp_path / "gap.exr")
+        assert [set(framebuffer[name].flat) for name in "RGB"] == [{value} for value in GAP]
+        assert set(framebuffer["A"].flat) == {1}
+        framebuffer.save(tmp_path / "gap.exr")
         assert clfractal.load_scene(tmp_path / "gap.exr").layout is not None
 
     def test_of_views_that_cover_each_other(self, device: Device) -> None:
@@ -165,13 +167,13 @@ class TestRegion:
         """Memory and time are those of the region: its tiles at the rims of two views of 8192 x 16384 pixels."""
         scene = scene_of([{}, VIEWS[1]], (16384, 16384))
         tracemalloc.start()
-        film, state = counted(device, scene, region=(8180, 8190, 30, 20), precision="float32")
+        framebuffer, state = counted(device, scene, region=(8180, 8190, 30, 20), precision="float32")
         _, peak = tracemalloc.get_traced_memory()
         tracemalloc.stop()
         # Rows 8190 to 8210 lie in two rows of tiles.
         assert (state.tiles, state.rays) == (2 + 2, 30 * 20)
-        assert film["R"].shape == (20, 30)
-        assert set(film["samples"].flat) == {1}
+        assert framebuffer["R"].shape == (20, 30)
+        assert set(framebuffer["samples"].flat) == {1}
         assert peak < 20e6
 
     def test_of_both_eyes(self, device: Device) -> None:
@@ -188,9 +190,9 @@ class TestAsked:
     """`samples` and `precision` are every view's, also of one that has a renderer of its own."""
 
     def test_samples(self, device: Device) -> None:
-        film, state = counted(device, layout(), samples=3)
+        framebuffer, state = counted(device, layout(), samples=3)
         for place in PLACES:
-            part = film["samples"][:, place.x : place.x + place.width]
+            part = framebuffer["samples"][:, place.x : place.x + place.width]
             assert set(part.flat) == {3}
         assert state.rays == 3 * sum(place.width * place.height for place in PLACES)
 
@@ -198,9 +200,9 @@ class TestAsked:
         """A view that stops by its noise, after at least 16 samples: asked for fewer, it takes these."""
         noisy = {"renderer": {"type": "surface", "samples": 64, "noise": 0.01, "min_samples": 16}}
         scene = scene_of([noisy, {}], SIZE)
-        film = engine_of(device).render(scene, samples=8, channels=CHANNELS)
-        assert film["samples"].max() == 8
-        same(engine_of(device).render(load_scene(film.header["scene"])), film)
+        framebuffer = engine_of(device).render(scene, samples=8, channels=CHANNELS)
+        assert framebuffer["samples"].max() == 8
+        same(engine_of(device).render(load_scene(framebuffer.header["scene"])), framebuffer)
 
     @pytest.mark.parametrize("precision", ["float32", "float64"])
     def test_precision(self, device: Device, precision: Precision) -> None:

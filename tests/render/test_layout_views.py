@@ -9,7 +9,7 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
 from clfractal.errors import FileError, SceneError
 from clfractal.scene.layout import Layout
@@ -29,27 +29,30 @@ def alone(scene: Scene, number: int, size: tuple[int, int]) -> Scene:
 
 
 def check(
-    film: npt.NDArray[np.float32], scene: Scene, places: list[tuple[int, int, int, int]], device: Device
+    framebuffer: npt.NDArray[np.float32],
+    scene: Scene,
+    places: list[tuple[int, int, int, int]],
+    device: Device,
 ) -> None:
     """Each place (x, y, width, height) has the bits of the view alone; all else is the layout's background."""
-    rest = np.ones(film.shape[:2], bool)
+    rest = np.ones(framebuffer.shape[:2], bool)
     for number, (x, y, width, height) in enumerate(places):
         own = stacked(shoot(alone(scene, number, (width, height)), device))
-        part = np.ascontiguousarray(film[y : y + height, x : x + width])
+        part = np.ascontiguousarray(framebuffer[y : y + height, x : x + width])
         np.testing.assert_array_equal(part.view(np.uint32), own.view(np.uint32), err_msg=f"view {number}")
         rest[y : y + height, x : x + width] = False
-    np.testing.assert_array_equal(film[rest][:, :3], np.full((rest.sum(), 3), GAP))
-    np.testing.assert_array_equal(film[rest][:, CHANNELS.index("A")], 1)
-    np.testing.assert_array_equal(film[rest][:, CHANNELS.index("Z")], np.inf)
+    np.testing.assert_array_equal(framebuffer[rest][:, :3], np.full((rest.sum(), 3), GAP))
+    np.testing.assert_array_equal(framebuffer[rest][:, CHANNELS.index("A")], 1)
+    np.testing.assert_array_equal(framebuffer[rest][:, CHANNELS.index("Z")], np.inf)
     others = [CHANNELS.index(name) for name in CHANNELS if name[0] in "NPi" or name in ("steps", "samples")]
-    assert not film[rest][:, others].any()
+    assert not framebuffer[rest][:, others].any()
 
 
 def test_views_beside_each_other(device: Device) -> None:
     """Cells of a row share what the gaps leave: (91 - 2 * 3) / 3 = 28 and a third."""
     scene = scene_of(VIEWS, gap=3)
-    film = shoot_whole(scene, device)
-    check(stacked(film), scene, [(0, 0, 28, 50), (31, 0, 28, 50), (62, 0, 29, 50)], device)
+    framebuffer = shoot_whole(scene, device)
+    check(stacked(framebuffer), scene, [(0, 0, 28, 50), (31, 0, 28, 50), (62, 0, 29, 50)], device)
 
 
 def test_a_plane_by_itself_has_no_other_planes_in_it(device: Device) -> None:
@@ -58,10 +61,10 @@ def test_a_plane_by_itself_has_no_other_planes_in_it(device: Device) -> None:
     scene = scene_of(VIEWS[:2])
     scene = load_scene({**scene.resolved(), "cut_planes": glass})
     assert [len(view.cut_planes) for view, _ in scene.views] == [1, 0]
-    film = stacked(shoot_whole(scene, device))
+    framebuffer = stacked(shoot_whole(scene, device))
     bare = stacked(shoot_whole(scene_of(VIEWS[:2]), device))
-    np.testing.assert_array_equal(film[:, 45:].view(np.uint32), bare[:, 45:].view(np.uint32))
-    assert (film[:, :45] != bare[:, :45]).any()
+    np.testing.assert_array_equal(framebuffer[:, 45:].view(np.uint32), bare[:, 45:].view(np.uint32))
+    assert (framebuffer[:, :45] != bare[:, :45]).any()
     with pytest.raises(SceneError, match=r"^layout\.views\.0\.cut_planes: are for surface and volume"):
         scene_of([{**VIEWS[1], "cut_planes": glass}])
 
@@ -79,13 +82,13 @@ def test_areas_cover_each_other_in_order(device: Device) -> None:
     """An inset over a view that fills the picture; parts of pixels are rounded."""
     views = [{**VIEWS[0], "area": [0, 0, 1, 1]}, {**VIEWS[1], "area": [0.7, 0.05, 0.25, 0.5]}]
     scene = scene_of(views)
-    film = stacked(shoot_whole(scene, device))
+    framebuffer = stacked(shoot_whole(scene, device))
     x, y, width, height = 64, 2, 22, 26  # 63.7, 2.5 (to even), 86.45 - 63.7, 27.5 (to even) - 2
     inset = stacked(shoot(alone(scene, 1, (width, height)), device))
-    np.testing.assert_array_equal(film[y : y + height, x : x + width], inset)
+    np.testing.assert_array_equal(framebuffer[y : y + height, x : x + width], inset)
     below = stacked(shoot(alone(scene, 0, (91, 50)), device))
     below[y : y + height, x : x + width] = inset
-    np.testing.assert_array_equal(film, below)
+    np.testing.assert_array_equal(framebuffer, below)
 
 
 @pytest.mark.parametrize(
@@ -127,20 +130,20 @@ def test_progress_and_the_rest_of_a_film(device: Device) -> None:
     scene = scene_of(VIEWS, gap=3)
     engine = engine_of(device)
     job = engine.prepare(scene, precision="float32", channels=CHANNELS)
-    films = JobFilms(job)
-    tile = films.films[0].grid.tile(0)
+    framebuffers = JobFramebuffers(job)
+    tile = framebuffers.framebuffers[0].grid.tile(0)
     kept = np.full((len(CHANNELS), tile.height, tile.width), 7, np.float32)
-    films.films[0].put(0, kept)
+    framebuffers.framebuffers[0].put(0, kept)
     seen: list[int] = []
-    state = run(job, films.films, engine.executor, progress=lambda p: seen.append(p.tiles_done))
+    state = run(job, framebuffers.framebuffers, engine.executor, progress=lambda p: seen.append(p.tiles_done))
     assert seen == sorted(seen)
     assert (state.tiles_done, state.tiles_before, state.tiles) == (6, 1, 6)
     assert state.rays == 50 * (28 + 28 + 2 * 29) - tile.width * tile.height
-    film = films.picture()
-    assert (film["R"][: tile.height, : tile.width] == 7).all()
+    framebuffer = framebuffers.picture()
+    assert (framebuffer["R"][: tile.height, : tile.width] == 7).all()
     whole = shoot_whole(scene, device)
-    np.testing.assert_array_equal(film["R"][tile.height :], whole["R"][tile.height :])
-    np.testing.assert_array_equal(film["R"][:, tile.width :], whole["R"][:, tile.width :])
+    np.testing.assert_array_equal(framebuffer["R"][tile.height :], whole["R"][tile.height :])
+    np.testing.assert_array_equal(framebuffer["R"][:, tile.width :], whole["R"][:, tile.width :])
 
 
 @pytest.mark.parametrize(

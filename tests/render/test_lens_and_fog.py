@@ -170,11 +170,11 @@ def test_fog(
     nothing. No density is no fog."""
     background = "transparent" if transparent else SKY
     scene = fog_scene(camera, density, background=background, covered=covered)
-    film = shoot(scene, device)
-    seen = stacked(film, ("R", "G", "B")).astype(float)
+    framebuffer = shoot(scene, device)
+    seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
     distance, nearest = to_sphere(origin, way, [0, 0, 0], BALL_RADIUS)
-    hit, miss = film["A"] == 1, film["A"] == 0
+    hit, miss = framebuffer["A"] == 1, framebuffer["A"] == 0
     inner = hit & (nearest < 0.98 * BALL_RADIUS)
     assert inner.sum() > 800
     through = np.exp(-density * np.where(inner, distance, 0))[..., None]
@@ -192,7 +192,7 @@ def test_fog_at_edges(device: Device, covered: bool) -> None:
     """Every sample is fogged by itself; what is transparent stays so."""
     density, samples = 0.5, 16
     scene = fog_scene(ORTHOGRAPHIC, density, background="transparent", covered=covered, samples=samples)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     expected, coverage = np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE))
     across, below = unit_squares(SIDE, SIDE, samples, 0)
     for n in range(samples):
@@ -203,10 +203,10 @@ def test_fog_at_edges(device: Device, covered: bool) -> None:
         expected += np.where(hit[..., None], RED * through + MIST * (1 - through), 0) / samples
         coverage += hit / samples
     # But for rays that pass the ball within the hit distance.
-    sure = film["A"] == coverage
+    sure = framebuffer["A"] == coverage
     edge = sure & (coverage > 0) & (coverage < 1)
     assert edge.sum() > 80
     assert sure.mean() > 0.98
-    seen = stacked(film, ("R", "G", "B"))
+    seen = stacked(framebuffer, ("R", "G", "B"))
     np.testing.assert_allclose(seen[edge], expected[edge], atol=0.004)
     np.testing.assert_allclose(seen[sure], expected[sure], atol=0.004)

@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from clfractal.schema.shape import turned_axes
@@ -27,11 +27,11 @@ def finest(device: Device) -> Precision:
     return "float64" if has_float64(device.info) else "float32"
 
 
-def hits(film: Film) -> tuple[Floats, Floats]:
+def hits(framebuffer: Framebuffer) -> tuple[Floats, Floats]:
     """Places and normals of pixels that are covered as a whole."""
-    whole = np.isfinite(film["Z"]) & (film["A"] > 0.999)
+    whole = np.isfinite(framebuffer["Z"]) & (framebuffer["A"] > 0.999)
     assert whole.sum() > 60
-    return points_of(film)[whole], normals_of(film)[whole]
+    return points_of(framebuffer)[whole], normals_of(framebuffer)[whole]
 
 
 def off(scene: Scene, places: Floats, normals: Floats, nearly: float = 1.002) -> Floats:
@@ -76,9 +76,11 @@ def test_what_is_dust_from_afar_has_these_normals_from_near(device: Device) -> N
                 "fov": 45 / nearer,
             }
             scene = scene_of(formula, camera, (24, 24), renderer=FINE)
-            film = shoot(scene, device, finest(device), lanes=4)
-            there = np.isfinite(film["Z"]) & (film["A"] > 0.999)
-            found.append(degrees(normals_of(film)[there], slopes(scene.chain, points_of(film)[there], 8)))
+            framebuffer = shoot(scene, device, finest(device), lanes=4)
+            there = np.isfinite(framebuffer["Z"]) & (framebuffer["A"] > 0.999)
+            found.append(
+                degrees(normals_of(framebuffer)[there], slopes(scene.chain, points_of(framebuffer)[there], 8))
+            )
         return np.concatenate(found)
 
     near, nearest = angles(40), angles(400)
@@ -128,7 +130,7 @@ def test_the_potential_has_the_slope_of_a_later_z(device: Device) -> None:
 
 
 @lru_cache
-def joined_film(device: Device, normal: str) -> tuple[Scene, Film]:
+def joined_framebuffer(device: Device, normal: str) -> tuple[Scene, Framebuffer]:
     ball = {"type": "sphere", "position": [-1.1, -0.5, 0], "radius": 0.5, "join": "cut"}
     renderer = {**FINE, "normal": normal}
     objects = {"ball": ball, "other": BESIDE}
@@ -137,9 +139,9 @@ def joined_film(device: Device, normal: str) -> tuple[Scene, Film]:
 
 
 def test_each_of_several_solids_has_its_own_level(device: Device) -> None:
-    scene, film = joined_film(device, "gradient")
+    scene, framebuffer = joined_framebuffer(device, "gradient")
     other = scene.objects["other"]
-    places, normals = hits(film)
+    places, normals = hits(framebuffer)
     assert isinstance(other, FormulaObject)
     axes = np.array(turned_axes(other.rotation))
     own = (places - np.array(other.position)) @ axes.T / other.scale

@@ -28,9 +28,9 @@ def test_ground_has_the_irradiance_of_closed_forms(
         renderer={"samples": 16 if mode == "direct" else 64, "detail": 0.25},
         background=[0, 0, 0],
     )
-    film = shoot(scene, device)
-    on_ground = ground(film)
-    found, right = colors(film)[on_ground][:, 0], expected(points_of(film)[on_ground])
+    framebuffer = shoot(scene, device)
+    on_ground = ground(framebuffer)
+    found, right = colors(framebuffer)[on_ground][:, 0], expected(points_of(framebuffer)[on_ground])
     assert on_ground.sum() > 500
     assert right.mean() > 0.05
     ratio = found.mean() / right.mean()

@@ -117,9 +117,9 @@ def test_a_rough_grid_is_met_where_its_values_pass_the_level(
     device: Device, folder: Path, precision: Precision, lanes: int | None, error: float
 ) -> None:
     scene = scene_of(folder, {"file": "rough.nrrd", "level": ROUGH_LEVEL, **TURNED})
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     t, normal = met(scene, ROUGH, ROUGH_LEVEL)
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     expected = np.isfinite(t)
     both = hit & expected
     assert 500 < both.sum() < both.size - 300
@@ -127,11 +127,11 @@ def test_a_rough_grid_is_met_where_its_values_pass_the_level(
     assert (hit != expected).sum() <= 3
     origin, direction, _ = rays(scene)
     points = origin + np.where(both, t, 0)[..., None] * direction
-    off = np.linalg.norm(points_of(film) - points, axis=-1)[both]
+    off = np.linalg.norm(points_of(framebuffer) - points, axis=-1)[both]
     # (The search by NumPy may miss what is thinner than its steps.)
     assert (off > 10 * error).mean() < 0.01
     assert np.median(off) < error
-    turned = np.linalg.norm(normals_of(film) - facing(normal, scene), axis=-1)[both]
+    turned = np.linalg.norm(normals_of(framebuffer) - facing(normal, scene), axis=-1)[both]
     assert (turned > 2e-3).mean() < 0.01
     assert np.median(turned) < 2e-5
 
@@ -141,14 +141,14 @@ def test_a_ball_is_a_ball_the_better_the_finer(device: Device, folder: Path) -> 
     errors = []
     for count in (12, 24, 48):
         scene = scene_of(folder, {"file": f"ball{count}.nrrd", "level": 0.0}, size=(64, 64))
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         origin, direction, _ = rays(scene)
         t, nearest = to_sphere(origin, direction, np.zeros(3), BALL_RADIUS)
         inner = nearest < 0.9 * BALL_RADIUS
-        assert (film["A"][inner] == 1).all()
+        assert (framebuffer["A"][inner] == 1).all()
         points = origin + np.where(inner, t, 0)[..., None] * direction
-        off = np.linalg.norm(points_of(film) - points, axis=-1)[inner]
-        turned = np.linalg.norm(normals_of(film) - points / BALL_RADIUS, axis=-1)[inner]
+        off = np.linalg.norm(points_of(framebuffer) - points, axis=-1)[inner]
+        turned = np.linalg.norm(normals_of(framebuffer) - points / BALL_RADIUS, axis=-1)[inner]
         errors.append((off.max(), turned.max()))
     depths, normals = np.array(errors).T
     assert depths[0] < 0.05
@@ -164,7 +164,7 @@ def test_values_that_grow_along_a_direction_have_a_plane(device: Device, folder:
     below = {**PERSPECTIVE, "position": [1.2, -2.2, -2.4], "target": [0, 0, 0]}
     for camera in (PERSPECTIVE, below):
         scene = scene_of(folder, {"file": "slope.nrrd", "level": 0.1}, camera=camera)
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         origin, direction, _ = rays(scene)
         near, far = to_box(origin, direction, np.full(3, -1.0), np.full(3, 2.0))
         t = (0.1 - origin @ up) / (direction @ up)
@@ -172,11 +172,11 @@ def test_values_that_grow_along_a_direction_have_a_plane(device: Device, folder:
         wall = (near < far) & (entry @ up > 0.1 + 0.1) & (np.sort(np.abs(entry), -1)[..., 1] < 0.89)
         plane = (near < t) & (t < far) & (np.abs(crossing).max(-1) < 0.89) & (entry @ up < 0.1)
         assert (wall if camera is PERSPECTIVE else plane).sum() > 150
-        np.testing.assert_allclose(points_of(film)[wall], entry[wall], atol=3e-6)
-        assert np.abs(np.abs(normals_of(film)[wall]).max(-1) - 1).max(initial=0) < 1e-6
-        np.testing.assert_allclose(points_of(film)[plane], crossing[plane], atol=3e-6)
+        np.testing.assert_allclose(points_of(framebuffer)[wall], entry[wall], atol=3e-6)
+        assert np.abs(np.abs(normals_of(framebuffer)[wall]).max(-1) - 1).max(initial=0) < 1e-6
+        np.testing.assert_allclose(points_of(framebuffer)[plane], crossing[plane], atol=3e-6)
         normal = np.broadcast_to(-up / np.linalg.norm(up), crossing.shape)
-        np.testing.assert_allclose(normals_of(film)[plane], normal[plane], atol=3e-6)
+        np.testing.assert_allclose(normals_of(framebuffer)[plane], normal[plane], atol=3e-6)
 
 
 def test_a_ball_throws_its_shadow_on_a_floor(device: Device, folder: Path) -> None:
@@ -192,7 +192,7 @@ def test_a_ball_throws_its_shadow_on_a_floor(device: Device, folder: Path) -> No
         camera=camera,
         material=material,
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     t = (-1 - origin[..., 2]) / direction[..., 2]
     points = origin + t[..., None] * direction
@@ -201,8 +201,8 @@ def test_a_ball_throws_its_shadow_on_a_floor(device: Device, folder: Path) -> No
     miss = to_sphere(points, np.broadcast_to(sun, points.shape), np.zeros(3), BALL_RADIUS)[1]
     dark, lit = ~ball & (miss < 0.99 * BALL_RADIUS), ~ball & (miss > 1.01 * BALL_RADIUS)
     assert dark.sum() > 50
-    assert (film["R"][dark] == 0).all()
-    np.testing.assert_allclose(film["R"][lit], sun[2], rtol=1e-5)
+    assert (framebuffer["R"][dark] == 0).all()
+    np.testing.assert_allclose(framebuffer["R"][lit], sun[2], rtol=1e-5)
 
 
 def test_bricks_know_their_least_and_largest_value() -> None:

@@ -1,4 +1,4 @@
-"""Objects beside the set: where rays meet them, against their equations; order, hiding, points and films."""
+"""Objects beside the set: where rays meet them, against their equations; order, hiding, points and framebuffers."""
 
 from __future__ import annotations
 
@@ -51,10 +51,10 @@ def test_an_object_is_where_its_equation_is_zero(
 ) -> None:
     # (Channels are float32, whatever the rays are.)
     scene = scene_of(NOWHERE, CAMERAS[camera], (48, 40), objects={name: OBJECTS[name]}, background=[0, 0, 0])
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     origin, direction, _ = rays(scene)
     t, normal, number = met(scene, origin, direction)
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     # At a rim a ray may round to either side.
     assert (hit != (number == 1)).sum() <= 1
     both = hit & (number == 1)
@@ -62,25 +62,25 @@ def test_an_object_is_where_its_equation_is_zero(
     view = view_of(scene)
     points = origin + np.where(both, t, 0)[..., None] * direction
     facing = np.abs((normal * direction).sum(-1))[both]
-    off = np.abs((points - view.origin) @ view.axis - film["Z"])[both]
+    off = np.abs((points - view.origin) @ view.axis - framebuffer["Z"])[both]
     assert (off * facing).max() < error
-    assert np.linalg.norm(points_of(film)[both] - points[both], axis=-1).max() < 50 * error
-    turned = np.linalg.norm(normals_of(film)[both] - normal[both], axis=-1)
+    assert np.linalg.norm(points_of(framebuffer)[both] - points[both], axis=-1).max() < 50 * error
+    turned = np.linalg.norm(normals_of(framebuffer)[both] - normal[both], axis=-1)
     # At an edge both faces are right.
     assert (turned > 1e-3).sum() <= 3
-    assert (film["iterations"][hit] == 0).all()
+    assert (framebuffer["iterations"][hit] == 0).all()
 
 
 def test_from_inside_a_solid_its_walls_are_seen(device: Device) -> None:
     camera = {"position": [0.1, -0.2, 0.1], "target": [1, 1, 0.3], "fov": 100}
     for name, size in (("box", {"size": [3, 2, 2]}), ("cylinder", {"radius": 1.5, "height": 2})):
         scene = scene_of(NOWHERE, camera, (40, 32), objects={name: {"type": name, **size}})
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         origin, direction, _ = rays(scene)
         t, normal, _ = met(scene, origin, direction)
-        assert (film["A"] == 1).all()
-        np.testing.assert_allclose(points_of(film), origin + t[..., None] * direction, atol=2e-5)
-        assert (np.linalg.norm(normals_of(film) - normal, axis=-1) > 1e-3).sum() <= 3
+        assert (framebuffer["A"] == 1).all()
+        np.testing.assert_allclose(points_of(framebuffer), origin + t[..., None] * direction, atol=2e-5)
+        assert (np.linalg.norm(normals_of(framebuffer) - normal, axis=-1) > 1e-3).sum() <= 3
 
 
 @pytest.mark.parametrize(
@@ -101,17 +101,17 @@ def test_water_is_its_sum_of_waves(
     sea = {"type": "water", "position": [0.1, 0, -0.2], "normal": [0.1, 0.05, 1], "waves": waves}
     camera = {**PERSPECTIVE, "position": [1.5, -2.5, 0.7]}
     scene = scene_of(NOWHERE, camera, (40, 32), objects={"sea": sea})
-    film = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
+    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     origin, direction, _ = rays(scene)
     t, normal, _ = met(scene, origin, direction)
     near = np.isfinite(t) & (t < 6)
     assert near.sum() > 600
-    assert (film["A"][near] == 1).all()
+    assert (framebuffer["A"][near] == 1).all()
     points = origin + np.where(near, t, 0)[..., None] * direction
-    off = np.linalg.norm(points_of(film) - points, axis=-1)[near]
+    off = np.linalg.norm(points_of(framebuffer) - points, axis=-1)[near]
     # A crest that a ray only just meets may be thinner than what either search sees.
     assert (off > 1e-4).mean() < 0.004
-    turned = np.linalg.norm(normals_of(film) - normal, axis=-1)[near]
+    turned = np.linalg.norm(normals_of(framebuffer) - normal, axis=-1)[near]
     assert (turned > 2e-3).mean() < 0.006
     assert np.median(turned) < 2e-5
 
@@ -188,7 +188,7 @@ def test_what_is_nearer_is_seen(device: Device, formula: dict[str, Any], search:
         scene_of(formula, PERSPECTIVE, (64, 48), objects=objects, materials=MATERIALS, renderer=settings),
         device,
     )
-    one, other, found = (np.minimum(film["Z"], 1e6) for film in (alone, beside, both))
+    one, other, found = (np.minimum(framebuffer["Z"], 1e6) for framebuffer in (alone, beside, both))
     assert (one < other).sum() > 300
     assert (other < one).sum() > 300
     # Where they meet, within a footprint, either is right.
@@ -204,14 +204,14 @@ def test_points_of_a_pixel_find_objects_on_their_own_rays(device: Device) -> Non
     points = {"pattern": "grid", "count": 9}
     objects = {"ball": {"type": "sphere", "radius": 0.8}}
     scene = scene_of(NOWHERE, PERSPECTIVE, (32, 32), objects=objects, renderer={"points": points})
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     expected = np.zeros((32, 32))
     for x in (1 / 6, 1 / 2, 5 / 6):
         for y in (1 / 6, 1 / 2, 5 / 6):
             origin, direction, _ = rays(scene, x, y)
             expected += np.isfinite(met(scene, origin, direction)[0]) / 9
     assert ((expected > 0) & (expected < 1)).sum() > 30
-    assert (np.abs(film["A"] - expected) > 1e-5).sum() <= 1
+    assert (np.abs(framebuffer["A"] - expected) > 1e-5).sum() <= 1
 
 
 @pytest.mark.parametrize("points", one_of(9, 1))
@@ -227,17 +227,17 @@ def test_an_object_hides_the_face_of_a_cut(device: Device, points: int) -> None:
         renderer={"points": {"pattern": "grid", "count": points}},
         cut_planes=[{"plane": plane, "cut": True, "opacity": 0}],
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     on_ball = np.isfinite(met(scene, origin, direction)[0])
     view = view_of(scene)
-    depth = (points_of(film) - view.origin) @ view.axis
+    depth = (points_of(framebuffer) - view.origin) @ view.axis
     assert on_ball.sum() > 40
     # With several points a pixel of its rim may show the face.
     assert (depth[on_ball] < 2.6).sum() >= on_ball.sum() - (0 if points == 1 else 2)
-    face = (film["A"] == 1) & (film["Z"] > 2.6)
+    face = (framebuffer["A"] == 1) & (framebuffer["Z"] > 2.6)
     assert face.sum() > 200
-    np.testing.assert_allclose(film["Z"][face], 4, atol=0.05)
+    np.testing.assert_allclose(framebuffer["Z"][face], 4, atol=0.05)
 
 
 def test_a_moving_object_keeps_its_program(device: Device) -> None:

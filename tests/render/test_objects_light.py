@@ -36,7 +36,7 @@ def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | Non
         background=[0, 0, 0],
     )
     shots: dict[str, Any] = {"lanes": lanes} if lanes else {}
-    film = shoot(scene, device, **shots)
+    framebuffer = shoot(scene, device, **shots)
     toward = -way / np.linalg.norm(way)
     origin, direction, _ = rays(scene)
     t, normal, number = met(scene, origin, direction)
@@ -46,11 +46,11 @@ def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | Non
     expected = np.where(shadowed, 0, toward[2])[on_floor]
     assert (expected == 0).sum() > 100
     assert (expected > 0).sum() > 500
-    assert (np.abs(colors(film)[on_floor][:, 0] - expected) > 1e-4).sum() <= 2
+    assert (np.abs(colors(framebuffer)[on_floor][:, 0] - expected) > 1e-4).sum() <= 2
     # The ball's own light: the cosine, and dark behind its terminator.
     on_ball = number == 2
     cosine = np.maximum((normal @ toward)[on_ball], 0)
-    np.testing.assert_allclose(colors(film)[on_ball][:, 0], cosine, atol=2e-4)
+    np.testing.assert_allclose(colors(framebuffer)[on_ball][:, 0], cosine, atol=2e-4)
     assert (cosine == 0).sum() > 10
 
 
@@ -96,9 +96,9 @@ def test_the_set_shadows_what_points_of_pixels_see_beside_it(device: Device, sea
         renderer={"search": search, "points": {"pattern": "grid", "count": 4}, "detail": 0.05},
         background=[0, 0, 0],
     )
-    film = shoot(scene, device)
-    points = points_of(film)
-    on_floor = (film["A"] == 1) & (np.abs(points[..., 2] + 1.6) < 1e-4)
+    framebuffer = shoot(scene, device)
+    points = points_of(framebuffer)
+    on_floor = (framebuffer["A"] == 1) & (np.abs(points[..., 2] + 1.6) < 1e-4)
     toward = -way / np.linalg.norm(way)
     along = points @ toward
     # How far a shadow ray passes the middle of the ball.
@@ -111,7 +111,7 @@ def test_the_set_shadows_what_points_of_pixels_see_beside_it(device: Device, sea
     sure = all_on_floor & (np.abs(passes - 1) > 0.08)
     assert (expected[sure] == 0).sum() > 90
     assert (expected[sure] > 0).sum() > 800
-    np.testing.assert_allclose(colors(film)[sure][:, 0], expected[sure], atol=1e-4)
+    np.testing.assert_allclose(colors(framebuffer)[sure][:, 0], expected[sure], atol=1e-4)
 
 
 @pytest.mark.parametrize(("light", "expected"), CASES, ids=["sphere", "rectangle", "spot"])
@@ -132,9 +132,9 @@ def test_a_plane_has_the_irradiance_of_closed_forms(
         renderer={"samples": 16 if mode == "direct" else 64},
         background=[0, 0, 0],
     )
-    film = shoot(scene, device)
-    found, right = colors(film)[..., 0], expected(points_of(film))
-    assert (film["A"] == 1).all()
+    framebuffer = shoot(scene, device)
+    found, right = colors(framebuffer)[..., 0], expected(points_of(framebuffer))
+    assert (framebuffer["A"] == 1).all()
     assert found.mean() == pytest.approx(right.mean(), rel=0.01)
 
 
@@ -151,13 +151,13 @@ def test_ambient_occlusion_of_a_ball_over_a_plane(device: Device) -> None:
         lights=[{"type": "directional"}],
         renderer={"samples": 4, "ambient_occlusion": {"rays": 64, "distance": 50}},
     )
-    film = shoot(scene, device)
-    points = points_of(film)
-    on_floor = (np.abs(points[..., 2] + 0.5) < 1e-4) & (film["A"] == 1)
+    framebuffer = shoot(scene, device)
+    points = points_of(framebuffer)
+    on_floor = (np.abs(points[..., 2] + 0.5) < 1e-4) & (framebuffer["A"] == 1)
     way = np.array(BALL_OBJECT["position"]) - points[on_floor]
     distance = np.linalg.norm(way, axis=-1)
     covered = 0.4**2 / distance**2 * way[:, 2] / distance
-    error = colors(film)[on_floor][:, 0] - (1 - covered)
+    error = colors(framebuffer)[on_floor][:, 0] - (1 - covered)
     assert covered.max() > 0.2
     assert abs(error.mean()) < 0.003
     assert np.abs(error).mean() < 0.02
@@ -186,7 +186,7 @@ def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
             renderer={"firefly_limit": None, "samples": 1},
             background=[0, 0, 0],
         )
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         origin, direction, _ = rays(scene)
         t, normal, number = met(scene, origin, direction)
         on_floor = number == 1
@@ -197,9 +197,11 @@ def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
         expected = np.where(seen[..., None], [3, 1.5, 0], 0)[on_floor]
         # (Along paths a mirror is a very narrow lobe, which rays at the rim may miss. What is beside it is asked for.)
         near = 0.01 if mode == "direct" else 0.1
-        wrong = (np.abs(colors(film)[on_floor] - expected) > near).any(axis=-1)
+        wrong = (np.abs(colors(framebuffer)[on_floor] - expected) > near).any(axis=-1)
         assert wrong.sum() <= (3 if mode == "direct" else 12)
-        np.testing.assert_allclose(colors(film)[number == 2], [[3, 1.5, 0]] * (number == 2).sum(), rtol=1e-5)
+        np.testing.assert_allclose(
+            colors(framebuffer)[number == 2], [[3, 1.5, 0]] * (number == 2).sum(), rtol=1e-5
+        )
 
 
 def test_fog_before_an_object(device: Device) -> None:
@@ -213,11 +215,13 @@ def test_fog_before_an_object(device: Device) -> None:
         lights=[],
         fog={"density": 0.3, "color": [0.5, 0.6, 0.7]},
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     t, _, _ = met(scene, origin, direction)
     passes = np.exp(-0.3 * t)[..., None]
-    np.testing.assert_allclose(colors(film), 2 * passes + (1 - passes) * np.array([0.5, 0.6, 0.7]), rtol=1e-4)
+    np.testing.assert_allclose(
+        colors(framebuffer), 2 * passes + (1 - passes) * np.array([0.5, 0.6, 0.7]), rtol=1e-4
+    )
 
 
 @pytest.mark.parametrize("kind", ["box", "sphere", "cylinder"])
@@ -244,8 +248,8 @@ def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
         renderer={"samples": 4},
         background=[9, 9, 9],
     )
-    film = shoot(scene, device)
-    np.testing.assert_allclose(colors(film), (1 - 0.5**8) / 0.5, rtol=2e-3)
+    framebuffer = shoot(scene, device)
+    np.testing.assert_allclose(colors(framebuffer), (1 - 0.5**8) / 0.5, rtol=2e-3)
 
 
 def test_white_objects_under_a_white_sky_are_white(device: Device) -> None:
@@ -299,8 +303,8 @@ def test_both_modes_show_an_object_about_alike(device: Device, name: str, materi
             renderer={"samples": 64, "firefly_limit": None},
             background={"top": [0, 0, 0], "bottom": [0, 0, 0]},
         )
-        film = shoot(scene, device)
-        found.append(colors(film)[film["A"] == 1])
+        framebuffer = shoot(scene, device)
+        found.append(colors(framebuffer)[framebuffer["A"] == 1])
     direct, path = found
     if name == "mirror":
         # Nothing is around it.

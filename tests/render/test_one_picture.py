@@ -16,7 +16,7 @@ from clfractal.engine.engine import Engine
 from clfractal.engine.prepare import with_size
 from clfractal.errors import SceneError
 from clfractal.geometry.fineness import NEAR, Fineness
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.march import SHADOW_DETAIL, march_record
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
@@ -43,21 +43,21 @@ def scene_of(formula: str = "quaternion_julia", more: str = "") -> Scene:
     return load_scene(SCENE.replace("FORMULA", formula) + more)
 
 
-def blocks(film: Film) -> npt.NDArray[np.float64]:
+def blocks(framebuffer: Framebuffer) -> npt.NDArray[np.float64]:
     """Mean light over BLOCKS x BLOCKS parts of a picture whose sides are multiples of BLOCKS."""
-    light = np.asarray(film, np.float64)[..., :3]
+    light = np.asarray(framebuffer, np.float64)[..., :3]
     rows, columns = light.shape[0] // BLOCKS, light.shape[1] // BLOCKS
     parts: npt.NDArray[np.float64] = light.reshape(BLOCKS, rows, BLOCKS, columns, 3).mean(axis=(1, 3))
     return parts
 
 
-def apart(one: Film, other: Film) -> float:
+def apart(one: Framebuffer, other: Framebuffer) -> float:
     """Mean difference of the blocks' light over its mean."""
     a, b = blocks(one), blocks(other)
     return float(np.abs(a - b).mean() / np.abs(b).mean())
 
 
-def same_bits(one: Film, other: Film) -> bool:
+def same_bits(one: Framebuffer, other: Framebuffer) -> bool:
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one.channels)
 
 
@@ -155,8 +155,8 @@ def test_a_size_that_is_none_is_told(engine: Engine, size: object) -> None:
 
 def test_engines_and_functions_take_a_size(engine: Engine) -> None:
     scene = scene_of("mandelbulb")
-    film = engine.render(scene, size=(48, 27))
-    assert film["R"].shape == (27, 48)
-    assert same_bits(film, render(scene, size=(48, 27)))
+    framebuffer = engine.render(scene, size=(48, 27))
+    assert framebuffer["R"].shape == (27, 48)
+    assert same_bits(framebuffer, render(scene, size=(48, 27)))
     last = list(engine.refine(scene, size=(48, 27)))[-1]
-    assert same_bits(film, last)
+    assert same_bits(framebuffer, last)

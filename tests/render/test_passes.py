@@ -13,7 +13,7 @@ from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.passes import kept_numbers
 from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
@@ -27,14 +27,14 @@ SPLITS = ((1, 1, 2, 12), (16,), (4, 4, 4, 4), (5, 11), (3, 1, 8, 4))
 
 def in_passes(
     scene: Scene, plan: Plan, device: Device, split: tuple[int, ...], executor: LocalExecutor
-) -> Iterator[Film]:
+) -> Iterator[Framebuffer]:
     """The picture after each of some passes."""
     done = 0
     for count in split:
-        film = Film(plan.channels, SIZE, plan.region)
-        run(job_of(scene, plan, device), [film], executor, samples=(done, done + count))
+        framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+        run(job_of(scene, plan, device), [framebuffer], executor, samples=(done, done + count))
         done += count
-        yield film
+        yield framebuffer
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
@@ -62,11 +62,13 @@ def test_passes_of_float64(kind: str, device: Device) -> None:
 def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
     """After n of 16 samples each pixel is the mean of its first n: sums of differences tell the single samples."""
     scene = scene_with("surface")
-    films = list(in_passes(scene, plan_of(scene, device), device, (1, 1, 2, 12), LocalExecutor(device)))
-    assert [float(film["samples"].max()) for film in films] == [1, 2, 4, 16]
-    sums = [film["R"] * film["samples"] for film in films]
+    framebuffers = list(
+        in_passes(scene, plan_of(scene, device), device, (1, 1, 2, 12), LocalExecutor(device))
+    )
+    assert [float(framebuffer["samples"].max()) for framebuffer in framebuffers] == [1, 2, 4, 16]
+    sums = [framebuffer["R"] * framebuffer["samples"] for framebuffer in framebuffers]
     assert all((after - before >= -1e-5).all() for before, after in pairwise(sums))
-    assert np.abs(films[0]["R"] - films[-1]["R"]).max() > 0.01
+    assert np.abs(framebuffers[0]["R"] - framebuffers[-1]["R"]).max() > 0.01
 
 
 @pytest.mark.parametrize("budget", one_of(1e-3, 1e-7))
@@ -88,11 +90,11 @@ def test_tiles_in_parts_have_the_same_bits(
         return start(self, span)
 
     monkeypatch.setattr(Drawing, "start", noted)
-    film = Film(plan.channels, SIZE, plan.region)
+    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
     executor = LocalExecutor(device, budget_seconds=budget)
-    state = run(job_of(scene, plan, device), [film], executor)
+    state = run(job_of(scene, plan, device), [framebuffer], executor)
     whole = shoot(scene, device)
-    np.testing.assert_array_equal(stacked(film), stacked(whole))
+    np.testing.assert_array_equal(stacked(framebuffer), stacked(whole))
     assert state.rays == whole["samples"].sum()
     if budget < 1e-5:
         assert any(samples[1] - samples[0] < 16 for _, samples in spans)
@@ -106,9 +108,9 @@ def test_what_passes_keep_follows_from_the_channels(device: Device) -> None:
     colors = plan_of(scene_with("surface"), device, precision, channels=("R", "G", "B"))
     plain, noisy = scene_with("surface").renderer, scene_with("surface", **NOISY).renderer
     assert len(kept_numbers(all_of_it, noisy)) == 18
-    assert kept_numbers(colors, plain) == ("red", "green", "blue", "shots")
+    assert kept_numbers(colors, plain) == ("red", "green", "blue", "samples")
     assert kept_numbers(colors, noisy) == (
-        *("red", "green", "blue", "coverage", "shots"),
+        *("red", "green", "blue", "coverage", "samples"),
         *("brightness", "brightness_square", "coverage_square"),
     )
 
@@ -130,13 +132,13 @@ def test_a_coarse_picture_is_every_nth_pixel(kind: str, divider: int, device: De
     scene = scene.model_copy(update={"image": {"width": 75, "height": 53}})
     small = PlannedView(scene, plan_of(scene, device)).coarse(divider)
     assert small.size == (-(-75 // divider), -(-53 // divider))
-    film = Film(small.plan.channels, small.size, small.plan.region)
-    run(job_of(scene, small.plan, device), [film], LocalExecutor(device))
+    framebuffer = Framebuffer(small.plan.channels, small.size, small.plan.region)
+    run(job_of(scene, small.plan, device), [framebuffer], LocalExecutor(device))
     # (Not the colours: soft shadows have other random places in another pixel.)
     names = ("A", "Z", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations")
     fine = stacked(shoot(scene, device), names)[divider // 2 :: divider, divider // 2 :: divider]
     # At the rim a block's middle may lie outside the picture.
-    coarse = stacked(film, names)[: fine.shape[0], : fine.shape[1]]
+    coarse = stacked(framebuffer, names)[: fine.shape[0], : fine.shape[1]]
     # Coordinates are rounded in another order, which at a rim or a border of counts decides.
     same = np.isclose(coarse, fine, rtol=1e-3, atol=1e-3).all(axis=-1)
     assert same.mean() > (0.9 if kind == "cut_plane" else 0.95)
@@ -145,13 +147,13 @@ def test_a_coarse_picture_is_every_nth_pixel(kind: str, divider: int, device: De
 def test_points_of_a_coarse_pixel_lie_all_over_its_block(device: Device) -> None:
     scene = scene_with("surface", samples=1, points={"count": 9})
     small = PlannedView(scene, plan_of(scene, device)).coarse(4)
-    film = Film(small.plan.channels, small.size, small.plan.region)
-    run(job_of(scene, small.plan, device), [film], LocalExecutor(device))
+    framebuffer = Framebuffer(small.plan.channels, small.size, small.plan.region)
+    run(job_of(scene, small.plan, device), [framebuffer], LocalExecutor(device))
     blocks = shoot(scene, device)["A"].reshape(12, 4, 18, 4).mean(axis=(1, 3))
     # A block's rays have cones as wide as it is, and touch a little earlier.
-    assert np.abs(film["A"] - blocks).mean() < 0.08
+    assert np.abs(framebuffer["A"] - blocks).mean() < 0.08
     rim = (blocks > 0.2) & (blocks < 0.8)
     assert rim.sum() > 5
     # (Nine rays may all miss what some of the block's pixels meet.)
-    assert (film["A"][rim] > 0).mean() > 0.9
-    assert (film["A"] <= 1).all()
+    assert (framebuffer["A"][rim] > 0).mean() > 0.9
+    assert (framebuffer["A"] <= 1).all()

@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.images.film import Film, in_memory
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.paste import Pasted
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
 from clfractal.images.tiles import TILE, Region
 from clfractal.scene.layout import Place
@@ -41,13 +41,15 @@ def needed(place: Place, region: Region) -> Region | None:
 
 
 def pasted(places: list[Place], size: tuple[int, int], region: Region) -> Pasted:
-    """Of films that hold what the region shows of each view and nothing else."""
+    """Of framebuffers that hold what the region shows of each view and nothing else."""
     stores: list[Picture] = []
     shown = []
     for seed, place in enumerate(places):
         part = needed(place, region)
         if part is not None:
-            stores.append(filled(Film(CHANNELS, (place.width, place.height), part), planes_of(place, seed)))
+            stores.append(
+                filled(Framebuffer(CHANNELS, (place.width, place.height), part), planes_of(place, seed))
+            )
             shown.append(place)
     return Pasted(stores, shown, size, region, FILL)
 
@@ -131,7 +133,7 @@ def test_headers_tell_what_all_views_do_and_the_time_of_all() -> None:
         {"scene": "version: 1\n", "worldToCamera": np.eye(4), "seconds": 1.5, "view": "left"},
         {"scene": "version: 1\n", "worldToCamera": np.eye(4), "seconds": 2.0, "view": "right"},
     ]
-    stores = [Film(CHANNELS, (4, 4), header=header) for header in headers]
+    stores = [Framebuffer(CHANNELS, (4, 4), header=header) for header in headers]
     picture = Pasted(stores, places, (8, 4), Region(0, 0, 8, 4), FILL, {"version": "0.1.0"})
     np.testing.assert_array_equal(picture.header.pop("worldToCamera"), np.eye(4))
     assert picture.header == {"scene": "version: 1\n", "version": "0.1.0", "seconds": 3.5}
@@ -146,8 +148,10 @@ def test_views_on_disk_need_memory_for_some_rows(tmp_path: Path) -> None:
     memory = pasted(places, size, region)
     stores = []
     for seed, place in enumerate(places):
-        film = JournalFilm(tmp_path / f"{seed}.partial", {}, CHANNELS, (place.width, place.height))
-        stores.append(filled(film, planes_of(place, seed)))
+        framebuffer = JournalFramebuffer(
+            tmp_path / f"{seed}.partial", {}, CHANNELS, (place.width, place.height)
+        )
+        stores.append(filled(framebuffer, planes_of(place, seed)))
     disk = Pasted(stores, places, size, region, FILL)
     tracemalloc.start()
     for _ in disk.bands():

@@ -77,12 +77,12 @@ def test_normals_of_a_ball(device: Device, variant: Variant, camera: str) -> Non
     places, inner = taken.ball()
     true, frame = taken.middle()
     assert inner.sum() > 60
-    normals = normals_of(taken.film)[inner]
+    normals = normals_of(taken.framebuffer)[inner]
     off = degrees(normals, true[inner])
     if kind == "gradient":
         # That of the point nearest to the middle: exact, but in another place. (The march lands a little before the hit.)
         most = 2e-3 if variant[0] == "distance" else 1e-3
-        assert degrees(normals, unit(points_of(taken.film)[inner] - SPHERE_CENTER)).max() < most
+        assert degrees(normals, unit(points_of(taken.framebuffer)[inner] - SPHERE_CENTER)).max() < most
         assert off.max() < 3
         return
     # The march ends half a hit distance before the surface, on a ball that much larger.
@@ -109,7 +109,7 @@ def test_normals_of_a_plane(device: Device, variant: Variant, camera: str) -> No
     _, nearest = to_sphere(origin, way, SPHERE_CENTER, SPHERE_RADIUS)
     inner = ((np.abs(on_top[..., :2]) < 1.15).all(-1) & (nearest > SPHERE_RADIUS + 0.02)).all(-1)
     assert inner.sum() > 600
-    off = degrees(normals_of(taken.film), np.array([0.0, 0, 1]))[inner]
+    off = degrees(normals_of(taken.framebuffer), np.array([0.0, 0, 1]))[inner]
     leaning = np.degrees(DETAIL / 6 / taken.scene.chain.step_scale * rays(taken.scene)[2].max())
     assert off.max() < (leaning if (variant[0], camera) == ("distance", "perspective") else 1e-3)
 
@@ -123,7 +123,7 @@ def test_coverage_is_the_share_of_the_points(device: Device, variant: Variant, c
     by_distance = variant[0] == "distance"
     fewest = taken.meets(-1e-5 if by_distance else -5e-3).sum(-1)
     most = taken.meets(taken.reach()).sum(-1)
-    coverage = taken.film["A"] * COUNT
+    coverage = taken.framebuffer["A"] * COUNT
     assert np.abs(coverage - np.round(coverage)).max() < 1e-5
     coverage = np.round(coverage)
     if not by_distance:
@@ -147,10 +147,10 @@ def test_silhouette(device: Device, variant: Variant, camera: str) -> None:
     """At the ball's rim, before nothing: the normal over the points that are there, or if they are too few or on a line
     that of the one nearest to the middle; for grids near that of the part that was found."""
     taken = shot(device, variant, camera)
-    there = taken.film["A"] > 0
-    lengths = np.linalg.norm(normals_of(taken.film)[there], axis=-1)
+    there = taken.framebuffer["A"] > 0
+    lengths = np.linalg.norm(normals_of(taken.framebuffer)[there], axis=-1)
     np.testing.assert_allclose(lengths, 1, atol=1e-6)
-    assert not normals_of(taken.film)[~there].any()
+    assert not normals_of(taken.framebuffer)[~there].any()
 
     places, _ = taken.ball()
     on_ball = np.isfinite(to_sphere(taken.origin, taken.way, SPHERE_CENTER, SPHERE_RADIUS)[0])
@@ -165,7 +165,7 @@ def test_silhouette(device: Device, variant: Variant, camera: str) -> None:
     if variant[1] != "gradient":
         made = made_of(variant[1], taken.middle()[1][rim], places)
         expected = np.where(np.isnan(made), expected, made)
-    normals = normals_of(taken.film)[rim]
+    normals = normals_of(taken.framebuffer)[rim]
     # By distance a point may be found beside the ball, where the radius has another direction.
     own = variant[1] == "gradient"
     assert degrees(normals, expected).max() < ((6 if own else 1) if variant[0] == "distance" else 0.01)
@@ -181,7 +181,7 @@ def test_colors(device: Device, variant: Variant, camera: str) -> None:
     """The gradient: every point is shaded, and the mean taken; `eight_triangles_shading`: every triangle; else once."""
     taken = shot(device, variant, camera)
     places, inner = taken.ball()
-    alone = np.maximum(normals_of(taken.film)[inner] @ LAMP, 0)
+    alone = np.maximum(normals_of(taken.framebuffer)[inner] @ LAMP, 0)
     tolerance = 5e-5
     if variant[1] == "gradient":
         each = (places[inner] - SPHERE_CENTER) / SPHERE_RADIUS
@@ -196,20 +196,20 @@ def test_colors(device: Device, variant: Variant, camera: str) -> None:
         tolerance = 3e-3 if variant[0] == "distance" else tolerance
     else:
         expected = alone
-    np.testing.assert_allclose(taken.film["R"][inner], expected, atol=tolerance)
+    np.testing.assert_allclose(taken.framebuffer["R"][inner], expected, atol=tolerance)
 
 
 @every
 def test_data_channels(device: Device, variant: Variant) -> None:
     """All finite, but Z where nothing is; P lies on the ray of the found point that is nearest to the middle."""
     taken = shot(device, variant, "orthographic")
-    film = taken.film
-    assert np.isfinite(stacked(film, [name for name in CHANNELS if name != "Z"])).all()
-    np.testing.assert_array_equal(np.isfinite(film["Z"]), film["A"] > 0)
-    whole = film["A"] == 1
+    framebuffer = taken.framebuffer
+    assert np.isfinite(stacked(framebuffer, [name for name in CHANNELS if name != "Z"])).all()
+    np.testing.assert_array_equal(np.isfinite(framebuffer["Z"]), framebuffer["A"] > 0)
+    whole = framebuffer["A"] == 1
     chosen = (taken.across**2 + taken.below**2).argmin(-1)[..., None, None]
     origin, way = (np.take_along_axis(a, chosen, axis=2)[:, :, 0] for a in (taken.origin, taken.way))
-    offset = points_of(film) - origin
+    offset = points_of(framebuffer) - origin
     aside = offset - (offset * way).sum(-1, keepdims=True) * way
     assert np.linalg.norm(aside, axis=-1)[whole].max() < 2e-6
 
@@ -218,22 +218,22 @@ def test_data_channels(device: Device, variant: Variant) -> None:
 def test_regions(device: Device, variant: Variant) -> None:
     """A region is that part of the picture, bit for bit."""
     part = stacked(shoot(scene_for(variant, "perspective"), device, region=(5, 9, 30, 21)))
-    np.testing.assert_array_equal(part, stacked(shot(device, variant, "perspective").film)[9:30, 5:35])
+    np.testing.assert_array_equal(part, stacked(shot(device, variant, "perspective").framebuffer)[9:30, 5:35])
 
 
 @pytest.mark.parametrize("variant", [v for v in VARIANTS if v[2] == "stochastic"], ids=" ".join)
 def test_seed_chooses_the_points(device: Device, variant: Variant) -> None:
     """Another seed, other points, which are known too; the same seed, the same."""
     first, second = (shot(device, variant, "perspective", seed) for seed in (0, 5))
-    assert not np.array_equal(first.film["A"], second.film["A"])
-    assert np.abs(first.film["A"] - second.film["A"]).mean() < 0.02
+    assert not np.array_equal(first.framebuffer["A"], second.framebuffer["A"])
+    assert np.abs(first.framebuffer["A"] - second.framebuffer["A"]).mean() < 0.02
     inner = first.ball()[1] & second.ball()[1]
-    assert (points_of(first.film) != points_of(second.film)).any(-1)[inner].all()
+    assert (points_of(first.framebuffer) != points_of(second.framebuffer)).any(-1)[inner].all()
     places = np.stack([first.across, first.below], axis=-1)
     assert not np.isclose(places[:, 1:], places[:, :-1], atol=1e-3).all((-2, -1)).any()
-    assert np.isclose(second.film["A"][inner], 1).all()
+    assert np.isclose(second.framebuffer["A"][inner], 1).all()
     again = shoot(scene_for(variant, "perspective", 5), device)
-    np.testing.assert_array_equal(stacked(again), stacked(second.film))
+    np.testing.assert_array_equal(stacked(again), stacked(second.framebuffer))
 
 
 # The unit ball by its own distance, by an orbit's Jacobian and by its scalar rule.
@@ -254,21 +254,21 @@ def test_nine_points_on_a_ball_are_as_exact_as_one(
         background="transparent",
         renderer={"points": {"count": COUNT}},
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, way, spread = rays(scene)
     t, _ = to_sphere(origin, way, (0, 0, 0), 1)
     met = np.isfinite(t)
     assert met.sum() > 15_000
-    assert (film["A"][met] > 0).all()
+    assert (framebuffer["A"][met] > 0).all()
     footprint = (spread * (t if camera == "perspective" else 1))[met]
-    along = ((points_of(film) - origin) * way).sum(-1)
+    along = ((points_of(framebuffer) - origin) * way).sum(-1)
     assert np.percentile(np.abs(along - t)[met] / footprint, 99) < 0.1
     true = (origin + np.where(met, t, 0)[..., None] * way)[met]
-    assert np.percentile(degrees(normals_of(film)[met], true), 99) < 0.06
+    assert np.percentile(degrees(normals_of(framebuffer)[met], true), 99) < 0.06
     grid = (np.arange(3) - 1) / 3 + 0.5
     each = [rays(scene, x, y)[:2] for x in grid for y in grid]
     area = np.mean([np.isfinite(to_sphere(*ray, (0, 0, 0), 1)[0]).sum() for ray in each])
-    assert abs(film["A"].sum(dtype=float) / area - 1) < 1e-3
+    assert abs(framebuffer["A"].sum(dtype=float) / area - 1) < 1e-3
 
 
 def hast(count: int, side: int) -> Scene:
@@ -289,7 +289,7 @@ def test_nine_points_cost_less_than_nine_rays(device: Device) -> None:
     points, one, many = (shoot(hast(n, side), device) for n, side in ((COUNT, 32), (1, 32), (1, 96)))
     assert points["steps"].sum() < 0.25 * many["steps"].sum()
     share = many["A"].astype(float).reshape(32, 3, 32, 3).mean((1, 3))
-    errors = [np.abs(film["A"] - share).mean() for film in (points, one)]
+    errors = [np.abs(framebuffer["A"] - share).mean() for framebuffer in (points, one)]
     assert errors[0] < 0.052
     assert errors[1] < 0.045  # 0.06 while one ray's hits were as wide as two pixels
     assert share.mean() - 0.005 < points["A"].mean() < share.mean() + 0.055

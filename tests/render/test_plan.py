@@ -42,12 +42,12 @@ def close_up(pixel: float, **sections: Any) -> Scene:
 
 def shading_error(device: Device, pixel: float, precision: Precision) -> tuple[float, float]:
     """Largest difference of R from the lamp's cosine law, and the share of pixels that hit."""
-    film = shoot(close_up(pixel), device, precision)
+    framebuffer = shoot(close_up(pixel), device, precision)
     place = (np.arange(48) + 0.5 - 24)[None, :], (np.arange(48) + 0.5 - 24)[:, None]
     # On the scale of some pixels the ball is a plane, the lamp stands 30 pixels above it.
     cosine = 30 / np.sqrt(place[0] ** 2 + place[1] ** 2 + 30**2)
-    hit = film["A"] > 0
-    return float(np.abs(film["R"] - cosine)[hit].max(initial=0)), float(hit.mean())
+    hit = framebuffer["A"] > 0
+    return float(np.abs(framebuffer["R"] - cosine)[hit].max(initial=0)), float(hit.mean())
 
 
 def test_a_usual_camera_takes_float32() -> None:

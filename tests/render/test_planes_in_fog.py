@@ -104,23 +104,23 @@ def test_quads_in_fog(device: Device, tmp_path: Path, camera: str, cut: bool) ->
         plane([0, 0.6, -0.1], [0.1, -1, 0.2], 0.6),
     ]
     scene, values = fog_scene(tmp_path, CAMERAS[camera], planes)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure, half = expected(scene, values)
     assert sure.mean() > 0.8
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=3e-4)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=1e-3)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
     # Where half of the light is stopped, by fog, a quad or a face.
     origin, direction, _ = rays(scene)
-    found = np.isfinite(film["Z"])
-    t = ((points_of(film) - origin) * direction).sum(-1)
+    found = np.isfinite(framebuffer["Z"])
+    t = ((points_of(framebuffer) - origin) * direction).sum(-1)
     off = np.abs(t - half)[sure & found & np.isfinite(half)]
     assert (found == np.isfinite(half))[sure].mean() > 0.98
     assert (off < 1e-4).mean() > 0.97
     assert off.max() < VOXEL
     if cut:
-        face = sure & found & (np.abs(film["iterations"] - 8) < 1e-6)
-        np.testing.assert_allclose(stacked(film, "RGB")[face & (coverage == 1)].max(), 0.9, atol=1e-4)
-        assert (np.abs(stacked(film, "RGB") - np.array(COLORS["inside"])).max(-1) < 1e-4).sum() > 150
+        face = sure & found & (np.abs(framebuffer["iterations"] - 8) < 1e-6)
+        np.testing.assert_allclose(stacked(framebuffer, "RGB")[face & (coverage == 1)].max(), 0.9, atol=1e-4)
+        assert (np.abs(stacked(framebuffer, "RGB") - np.array(COLORS["inside"])).max(-1) < 1e-4).sum() > 150
 
 
 def test_quads_at_one_distance_in_fog(device: Device, tmp_path: Path) -> None:
@@ -129,17 +129,17 @@ def test_quads_at_one_distance_in_fog(device: Device, tmp_path: Path) -> None:
     scene, values = fog_scene(
         tmp_path, PERSPECTIVE, [plane(*place, 0.5, inside_opacity=0.0), plane(*place, 0.6)]
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure, _ = expected(scene, values)
     assert sure.mean() > 0.8
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=3e-4)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=1e-3)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
 
 
 def test_faint_fog_before_an_opaque_quad(device: Device, tmp_path: Path) -> None:
     """Fog that stops less than half of the light is seen before a quad all the same."""
     scene, values = fog_scene(tmp_path, ORTHOGRAPHIC, [plane([0, 0.2, 0], [0, -1, 0], 1.0)] * 2)
-    film = shoot(load_scene(scene.resolved(), folder=tmp_path), device)
+    framebuffer = shoot(load_scene(scene.resolved(), folder=tmp_path), device)
     color, coverage, sure, _ = expected(scene, values)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=1e-3)
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=3e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)

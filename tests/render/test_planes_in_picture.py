@@ -109,11 +109,11 @@ def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -
     toward = position / np.linalg.norm(position)
     place = [float(x) for x in -distance * toward + [0.1, 0, 0.05]]
     scene = picture(renderer, CAMERAS[camera], [plane(place, [0.2, -1, 0.5], 0.7)])
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure = layered(scene, renderer)
     assert sure.mean() > 0.85
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
     if distance > 0:
         return
     # The data channels tell of a quad that stops half of the light or more.
@@ -122,15 +122,15 @@ def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -
     front = seen & sure & (t < to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[0])
     assert front.sum() > 20
     points = origin + t[..., None] * direction
-    np.testing.assert_allclose(points_of(film)[front], points[front], atol=1e-5)
+    np.testing.assert_allclose(points_of(framebuffer)[front], points[front], atol=1e-5)
     np.testing.assert_allclose(
-        film["Z"][front], (points - scene.camera.position)[front] @ view_of(scene).axis, atol=1e-5
+        framebuffer["Z"][front], (points - scene.camera.position)[front] @ view_of(scene).axis, atol=1e-5
     )
     np.testing.assert_allclose(
-        normals_of(film)[front], scene.cut_planes[0].plane.placed.normal + 0 * points[front], atol=1e-6
+        normals_of(framebuffer)[front], scene.cut_planes[0].plane.placed.normal + 0 * points[front], atol=1e-6
     )
     count = reference.escape(scene.chain, points[front], BALL_ITERATIONS)[0]
-    np.testing.assert_array_equal(film["iterations"][front], count)
+    np.testing.assert_array_equal(framebuffer["iterations"][front], count)
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -138,7 +138,7 @@ def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -
 def test_a_quad_that_stops_exactly_half(device: Device, renderer: str, opacity: float) -> None:
     """Half of the light is enough for the data channels; less is not."""
     scene = picture(renderer, PERSPECTIVE, [plane([0.0, -1.3, 0.3], [0.2, -1, 0.5], opacity)])
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     seen, t, room = met(scene, 0)
     origin, direction, _ = rays(scene)
     # Past the ball there is nothing else that the channels could tell of.
@@ -146,11 +146,11 @@ def test_a_quad_that_stops_exactly_half(device: Device, renderer: str, opacity: 
     assert alone.sum() > 20
     points = (origin + t[..., None] * direction)[alone]
     if opacity < 0.5:
-        assert np.isposinf(film["Z"][alone]).all()
-        assert not points_of(film)[alone].any()
+        assert np.isposinf(framebuffer["Z"][alone]).all()
+        assert not points_of(framebuffer)[alone].any()
     else:
-        np.testing.assert_allclose(points_of(film)[alone], points, atol=1e-5)
-        assert np.isfinite(film["Z"][alone]).all()
+        np.testing.assert_allclose(points_of(framebuffer)[alone], points, atol=1e-5)
+        assert np.isfinite(framebuffer["Z"][alone]).all()
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -164,11 +164,11 @@ def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> Non
         plane([0, 1.3, 0], [0, -1, 0.2], 1.0),
     ]
     scene = picture(renderer, camera, planes)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure = layered(scene, renderer)
     assert sure.mean() > 0.75
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
     assert len(np.unique(np.round(coverage[sure], 4))) >= 4
 
 
@@ -181,11 +181,11 @@ def test_the_set_on_a_plane_has_its_own_opacity(
     outside, inside = opacities
     planes = [plane([0.0, -1.0, 0.05], [0.1, -1, 0.1], outside, inside_opacity=inside, iterations=2)]
     scene = picture(renderer, PERSPECTIVE, planes, iterations=BALL_ITERATIONS)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure = layered(scene, renderer)
     assert sure.mean() > 0.8
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
     # A quad that stops half of the light or more is what the data channels tell of, where it does.
     seen, t, _ = met(scene, 0)
     origin, direction, _ = rays(scene)
@@ -193,10 +193,10 @@ def test_the_set_on_a_plane_has_its_own_opacity(
     front = seen & (t < to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)[0])
     disc = front & sure & (tint == np.array(COLORS["inside"])).all(-1)
     assert disc.sum() > 100
-    on_plane = np.abs(film["iterations"] - 2) < 1e-6
+    on_plane = np.abs(framebuffer["iterations"] - 2) < 1e-6
     if outside < 0.5:
         assert on_plane[disc].all()
-        assert not on_plane[~seen & sure & np.isfinite(film["Z"])].any()
+        assert not on_plane[~seen & sure & np.isfinite(framebuffer["Z"])].any()
     else:
         assert not on_plane[disc].any()
 
@@ -212,11 +212,11 @@ def test_quads_at_one_distance(device: Device, renderer: str) -> None:
         plane([0, 1.3, 0], [0, -1, 0.2], 1.0),
     ]
     scene = picture(renderer, PERSPECTIVE, planes)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     color, coverage, sure = layered(scene, renderer)
     assert sure.mean() > 0.7
-    np.testing.assert_allclose(film["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(film, "RGB")[sure], color[sure], atol=2e-4)
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
     assert {0.85, 0.91, 1.0} <= set(np.round(coverage[sure], 4).tolist())
 
 
@@ -265,8 +265,8 @@ def test_a_plane_in_a_deep_zoom(device: Device) -> None:
     for scene in scenes:
         precision, remark = choose_precision(scene, "auto", has_float64=True)
         assert (precision, remark) == ("float64", "")
-        film = shoot(scene, device, precision)
-        np.testing.assert_array_equal(film["iterations"][certain], count[certain])
+        framebuffer = shoot(scene, device, precision)
+        np.testing.assert_array_equal(framebuffer["iterations"][certain], count[certain])
 
 
 CUT_CENTER, CUT_NORMAL = np.array([0.1, -0.35, 0.15]), np.array([0.3, -1.0, 0.4])
@@ -280,7 +280,7 @@ def test_a_cut_ball(device: Device, renderer: str, camera: str) -> None:
     ball = 4.0**0.125  # of three applications
     cut = plane(list(CUT_CENTER), list(CUT_NORMAL), 0.0, cut=True, iterations=8)
     scene = picture(renderer, CAMERAS[camera], [cut], iterations=3)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     normal = CUT_NORMAL / np.linalg.norm(CUT_NORMAL)
     t = ((CUT_CENTER - origin) @ normal) / (direction @ normal)
@@ -292,16 +292,16 @@ def test_a_cut_ball(device: Device, renderer: str, camera: str) -> None:
     assert face.sum() > 250
     count = reference.escape(scene.chain, there[face & certain], 8)[0]
     assert {5, 6, 7, 8} <= set(count.tolist())
-    np.testing.assert_array_equal(film["iterations"][face & certain], count)
-    picture_, points = stacked(film, "RGB"), points_of(film)
+    np.testing.assert_array_equal(framebuffer["iterations"][face & certain], count)
+    picture_, points = stacked(framebuffer, "RGB"), points_of(framebuffer)
     np.testing.assert_allclose(picture_[face & certain], tint[face & certain], atol=2e-4)
     np.testing.assert_allclose(points[face & certain], there[face & certain], atol=1e-5)
     np.testing.assert_allclose(
-        normals_of(film)[face & certain], normal + 0 * there[face & certain], atol=1e-6
+        normals_of(framebuffer)[face & certain], normal + 0 * there[face & certain], atol=1e-6
     )
-    np.testing.assert_array_equal(film["A"][face & certain], 1)
+    np.testing.assert_array_equal(framebuffer["A"][face & certain], 1)
     # The rest of the ball, behind the plane; and no face anywhere else.
-    others = certain & ~face & (film["A"] > 0)
+    others = certain & ~face & (framebuffer["A"] > 0)
     assert others.sum() > 15
     assert ((points[others] - CUT_CENTER) @ normal < 0.02).all()
     assert np.abs(np.linalg.norm(points[others], axis=-1) - ball).max() < 2 * OFF[renderer]
@@ -311,7 +311,7 @@ def test_a_cut_ball(device: Device, renderer: str, camera: str) -> None:
         (radius > ball + 2 * OFF[renderer]) & (direction @ normal < 0) & ((there * direction).sum(-1) > 0)
     )
     assert beyond.sum() > 5
-    assert not film["A"][beyond].any()
+    assert not framebuffer["A"][beyond].any()
 
 
 @pytest.mark.parametrize("renderer", RENDERERS)
@@ -337,26 +337,28 @@ def test_what_is_cut_away_throws_no_shadow(device: Device, tmp_path: Path, rende
         "target": list(middle),
         "height": 2.6,
     }
-    films = {}
+    framebuffers = {}
     for cut in (False, True):
         planes = [plane(list(middle + np.array([0, 0, 0.3])), [0, 0, 1], 0.0, cut=cut, up=[0, 1, 0])]
-        films[cut] = shoot(picture(renderer, camera, planes, folder=tmp_path, **look), device)
-    places = {cut: points_of(film) - middle for cut, film in films.items()}
+        framebuffers[cut] = shoot(picture(renderer, camera, planes, folder=tmp_path, **look), device)
+    places = {cut: points_of(framebuffer) - middle for cut, framebuffer in framebuffers.items()}
     top = {
-        cut: (np.abs(film["P.Z"]) < 0.03) & (film["A"] == 1) & (film["N.Z"] > 0.999)
-        for cut, film in films.items()
+        cut: (np.abs(framebuffer["P.Z"]) < 0.03) & (framebuffer["A"] == 1) & (framebuffer["N.Z"] > 0.999)
+        for cut, framebuffer in framebuffers.items()
     }
     both = top[True] & top[False] & (np.abs(places[True][..., :2]).max(-1) < 1.1)
     assert both.sum() > 700
     away = np.linalg.norm(places[True][..., :2] - SPHERE_CENTER[:2], axis=-1)
     shadow = both & (away < SPHERE_RADIUS - 0.05)
     assert shadow.sum() > 20
-    np.testing.assert_allclose(films[True]["R"][both], 0.75, atol=0.01)
-    np.testing.assert_allclose(films[False]["R"][shadow], 0.25, atol=0.01)
-    np.testing.assert_allclose(films[False]["R"][both & (away > SPHERE_RADIUS + 0.05)], 0.75, atol=0.01)
+    np.testing.assert_allclose(framebuffers[True]["R"][both], 0.75, atol=0.01)
+    np.testing.assert_allclose(framebuffers[False]["R"][shadow], 0.25, atol=0.01)
+    np.testing.assert_allclose(
+        framebuffers[False]["R"][both & (away > SPHERE_RADIUS + 0.05)], 0.75, atol=0.01
+    )
     # The sphere itself is gone.
-    assert (films[False]["P.Z"] > 1).any()
-    assert (films[True]["P.Z"] < 0.1).all()
+    assert (framebuffers[False]["P.Z"] > 1).any()
+    assert (framebuffers[True]["P.Z"] < 0.1).all()
 
 
 def solids(corner: Floats, voxels: int, spacing: float) -> npt.NDArray[np.uint8]:

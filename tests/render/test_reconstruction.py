@@ -14,7 +14,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.files.exr import write_exr
 from clfractal.files.srgb import encode
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.outputs import save_outputs
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
@@ -111,23 +111,23 @@ def test_samples_by_noise(
 ) -> None:
     """Sample by sample: the standard error of what is seen, light or coverage, is what stops a pixel."""
     samples = 128
-    film = shoot(adaptive(noise, samples, least, white, transparent), device)
+    framebuffer = shoot(adaptive(noise, samples, least, white, transparent), device)
     # A ray past the ball hits where the distance, half the true one there, is below 0.03 of DETAIL.
     hit_distance = DETAIL * 2.6 / SIDE
     sure = (np.abs(passing(samples) - BALL_RADIUS - RIM * hit_distance) > 0.2 * hit_distance).all(-1)
     hits = passing(samples) < BALL_RADIUS + RIM * hit_distance
     count, mean = judged(hits.astype(float), noise, least or 16)
-    taken, first = film["samples"], 4 * -(-(least or 16) // 4)
+    taken, first = framebuffer["samples"], 4 * -(-(least or 16) // 4)
     assert taken.min() == first
     assert taken.max() <= samples
     assert (sure & (count > first)).sum() > 45
     np.testing.assert_array_equal(taken[sure], count[sure])
-    np.testing.assert_allclose(film["A"][sure], mean[sure], atol=1e-6)
-    np.testing.assert_allclose(film["R"], film["A"] if white else 0, atol=1e-6)
+    np.testing.assert_allclose(framebuffer["A"][sure], mean[sure], atol=1e-6)
+    np.testing.assert_allclose(framebuffer["R"], framebuffer["A"] if white else 0, atol=1e-6)
     # The error is below what was asked for, but where samples ran out or the first ones were all alike by chance.
     exact = (passing() < BALL_RADIUS + RIM * hit_distance).mean(-1)
-    error = film["A"] - exact
-    alike = (film["A"] == 0) | (film["A"] == 1)
+    error = framebuffer["A"] - exact
+    alike = (framebuffer["A"] == 0) | (framebuffer["A"] == 1)
     assert np.abs(error[alike]).max() < 1.5 / first
     stopped = ~alike & (taken < samples)
     assert stopped.sum() > 10
@@ -137,26 +137,26 @@ def test_samples_by_noise(
 def test_samples_by_the_noise_of_greys(device: Device) -> None:
     """What counts is brightness as an eye perceives it, the root of luminance; 0 and 1 are their own roots."""
     ball, sky, noise, samples = 0.09, 0.36, 0.0191, 64
-    film = shoot(adaptive(noise, samples, None, True, False, (ball, sky)), device)
+    framebuffer = shoot(adaptive(noise, samples, None, True, False, (ball, sky)), device)
     hit_distance = DETAIL * 2.6 / SIDE
     sure = (np.abs(passing(samples) - BALL_RADIUS - RIM * hit_distance) > 0.2 * hit_distance).all(-1)
     hits = passing(samples) < BALL_RADIUS + RIM * hit_distance
     count, _ = judged(np.where(hits, ball**0.5, sky**0.5), noise, 16)
     # The roots differ by 0.3, the luminances by 0.27: neither these nor others would stop at the same samples.
     assert len(np.unique(count[sure])) > 5
-    np.testing.assert_array_equal(film["samples"][sure], count[sure])
+    np.testing.assert_array_equal(framebuffer["samples"][sure], count[sure])
 
 
 def test_without_noise_every_pixel_gets_all(device: Device) -> None:
-    film = shoot(adaptive(None, 24, None, True, False), device)
-    assert (film["samples"] == 24).all()
+    framebuffer = shoot(adaptive(None, 24, None, True, False), device)
+    assert (framebuffer["samples"] == 24).all()
     # A target that nothing meets leaves the same samples, and so the same picture.
     strict = shoot(adaptive(1e-9, 24, None, True, False), device)
-    flat_parts = (film["A"] == 0) | (film["A"] == 1)
+    flat_parts = (framebuffer["A"] == 0) | (framebuffer["A"] == 1)
     assert (strict["samples"][flat_parts] == 16).all()
     assert (strict["samples"][~flat_parts] == 24).mean() > 0.9
     whole = strict["samples"] == 24
-    np.testing.assert_array_equal(stacked(strict, RGB)[whole], stacked(film, RGB)[whole])
+    np.testing.assert_array_equal(stacked(strict, RGB)[whole], stacked(framebuffer, RGB)[whole])
 
 
 # Fireflies.
@@ -175,8 +175,8 @@ def sun_scene(folder: Path, sun: float, limit: float | None, **sections: Any) ->
     return scene_of(BALL, PERSPECTIVE, (SIDE, SIDE), folder=folder, **{**usual, **sections})
 
 
-def seen(film: Film) -> Floats:
-    return stacked(film, RGB).astype(float)
+def seen(framebuffer: Framebuffer) -> Floats:
+    return stacked(framebuffer, RGB).astype(float)
 
 
 def matt(reflection: float) -> dict[str, Any]:
@@ -230,15 +230,15 @@ def test_edges_have_the_surfaces_colour(device: Device, tmp_path: Path, name: st
         background="transparent",
         renderer={"samples": 64, "filter": name, "noise": 0.02},
     )
-    film = shoot(scene, device)
-    coverage = film["A"][..., None]
+    framebuffer = shoot(scene, device)
+    coverage = framebuffer["A"][..., None]
     edge = ((coverage > 0) & (coverage < 1))[..., 0]
     assert edge.sum() > 100
     np.testing.assert_allclose(
-        stacked(film, RGB)[edge] / coverage[edge], np.broadcast_to(color, (edge.sum(), 3)), rtol=1e-5
+        stacked(framebuffer, RGB)[edge] / coverage[edge], np.broadcast_to(color, (edge.sum(), 3)), rtol=1e-5
     )
     path = tmp_path / "ball.png"
-    save_outputs(film, [path], transparent=True, bits=bits)
+    save_outputs(framebuffer, [path], transparent=True, bits=bits)
     width, height, rows, _ = png.Reader(filename=str(path)).read()
     pixels: npt.NDArray[Any] = np.array([list(row) for row in rows]).reshape(height, width, 4)
     largest = 2**bits - 1

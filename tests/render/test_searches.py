@@ -20,7 +20,7 @@ from clfractal.formulas.backends import NumpyBackend
 from clfractal.formulas.catalog import names
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.reference import apply, constant_of, space_to_state
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
 from tests.render.shots import (
@@ -106,7 +106,7 @@ class Found:
     """What one search finds along the rays through the pixels' middles; arrays of shape (SIDE, SIDE)."""
 
     scene: Scene
-    film: Film
+    framebuffer: Framebuffer
     origin: Floats
     direction: Floats
     footprint: Floats  # at the point found
@@ -131,10 +131,12 @@ class Found:
 
 
 def found_by(device: Device, scene: Scene, precision: Precision = "float32") -> Found:
-    film = shoot(scene, device, precision, channels=CHANNELS)
+    framebuffer = shoot(scene, device, precision, channels=CHANNELS)
     origin, direction, spread = rays(scene)
-    t = ((points_of(film) - origin) * direction).sum(-1)
-    return Found(scene, film, origin, direction, spread * t, film["A"] > 0, t, normals_of(film))
+    t = ((points_of(framebuffer) - origin) * direction).sum(-1)
+    return Found(
+        scene, framebuffer, origin, direction, spread * t, framebuffer["A"] > 0, t, normals_of(framebuffer)
+    )
 
 
 @lru_cache
@@ -151,8 +153,8 @@ def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     within a footprint of the solid, of which that ray crosses no part that is longer than a step."""
     near, far = both(device, name)
     assert name in THIN or far.hit.sum() > 0.08 * far.hit.size
-    assert np.isfinite(stacked(near.film, CHANNELS[2:])).all()
-    assert np.isfinite(stacked(far.film, CHANNELS[2:])).all()
+    assert np.isfinite(stacked(near.framebuffer, CHANNELS[2:])).all()
+    assert np.isfinite(stacked(far.framebuffer, CHANNELS[2:])).all()
     missed = 0.0 if name in KINDS and name not in MISSED else SLIPS
     assert (far.hit & ~near.hit).sum() <= missed * far.hit.sum()
 
@@ -204,13 +206,13 @@ def test_other_steps(device: Device, name: str, step: float) -> None:
     assert (other.t[shared] > near.t[shared] - near.footprint[shared] - other.step).all()
     # Every ray that crosses the bounds takes its chord's steps, until it hits.
     _, radius = other.scene.bounds
-    missed = ~other.hit & (other.film["steps"] > 0)
+    missed = ~other.hit & (other.framebuffer["steps"] > 0)
     first, nearest = to_sphere(other.origin, other.direction, other.scene.bounds[0], radius)
     chord = 2 * np.sqrt(np.maximum(radius**2 - nearest**2, 0))
     np.testing.assert_allclose(
-        other.film["steps"][missed], np.floor(chord / other.step)[missed] + 1, rtol=1e-3, atol=1.01
+        other.framebuffer["steps"][missed], np.floor(chord / other.step)[missed] + 1, rtol=1e-3, atol=1.01
     )
-    assert (other.film["steps"][other.hit] <= ((other.t - first) / other.step)[other.hit] + 45).all()
+    assert (other.framebuffer["steps"][other.hit] <= ((other.t - first) / other.step)[other.hit] + 45).all()
 
 
 def test_steps_of_a_ball(device: Device) -> None:
@@ -252,10 +254,12 @@ def test_shadows_of_steps_begin_small(device: Device) -> None:
         material={"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]},
         renderer={"search": "steps", "step": step, "detail": detail},
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     footprint = rays(scene)[2][0, 0]
-    points = points_of(film)
-    ground = (film["A"] == 1) & (np.abs(points[..., 2]) < 1e-3) & (np.abs(points[..., :2]) < 1.15).all(-1)
+    points = points_of(framebuffer)
+    ground = (
+        (framebuffer["A"] == 1) & (np.abs(points[..., 2]) < 1e-3) & (np.abs(points[..., :2]) < 1.15).all(-1)
+    )
     assert ground.sum() > 600
     places, pace = [0.0], footprint
     while places[-1] < 2:
@@ -266,7 +270,7 @@ def test_shadows_of_steps_begin_small(device: Device) -> None:
     depth = SPHERE_RADIUS - np.hypot(across[:, None], height - SPHERE_CENTER[2]).min(axis=1)
     sure = np.abs(depth) > 2e-3
     assert sure.mean() > 0.97
-    np.testing.assert_array_equal((film["R"][ground] == 0)[sure], (depth > 0)[sure])
+    np.testing.assert_array_equal((framebuffer["R"][ground] == 0)[sure], (depth > 0)[sure])
     assert (across[depth > 0] > 0.8 * SPHERE_RADIUS).sum() > 10
 
 
@@ -316,7 +320,7 @@ def unexplained(near: Found, early: Bools) -> int:
         reach = scale * near.footprint[left]
         ball = random.normal(size=(int(left.sum()), 1500, 3))
         ball *= (random.random(ball.shape[:2]) ** (1 / 3) / np.linalg.norm(ball, axis=-1))[..., None]
-        points = points_of(near.film)[left][:, None] + reach[:, None, None] * ball
+        points = points_of(near.framebuffer)[left][:, None] + reach[:, None, None] * ball
         solid = inside(near.scene, points.reshape(-1, 3)).reshape(ball.shape[:2]).any(axis=1)
         left[left] = ~solid
     return int(left.sum())

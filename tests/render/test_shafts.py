@@ -89,8 +89,8 @@ def test_scattered_light_is_the_integral(
     device: Device, light: dict[str, Any], fog: dict[str, Any], paths: bool
 ) -> None:
     scene = scene_with(light, 256, paths=paths, **fog)
-    film = shoot(scene, device)
-    seen = stacked(film, ("R", "G", "B")).astype(float)
+    framebuffer = shoot(scene, device)
+    seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
     distance, nearest = to_sphere(np.broadcast_to(origin, way.shape), way, [0, 0, 0], BALL_RADIUS)
     sure = (nearest < 0.9 * BALL_RADIUS) | (nearest > 1.1 * BALL_RADIUS)

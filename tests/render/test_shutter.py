@@ -19,7 +19,7 @@ from clfractal.camera.views import View
 from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError, SceneError
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import shutter as shutters
 from clfractal.integrators.shutter import Shutter, shutter_of
 from clfractal.scene.load import dump_scene, load_scene
@@ -73,7 +73,7 @@ def engine() -> Engine:
     return Engine()
 
 
-def same(one: Film, other: Film) -> None:
+def same(one: Framebuffer, other: Framebuffer) -> None:
     assert one.channels == other.channels
     for name in one.channels:
         np.testing.assert_array_equal(one[name], other[name], name)

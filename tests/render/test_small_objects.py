@@ -9,7 +9,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import BALL, BALL_RADIUS, QUICK_BALL, colors, points_of, shoot
@@ -65,9 +65,9 @@ def test_a_small_ball_has_its_own_shadow(
         background=[0, 0, 0],
         **light_of(mode),
     )
-    film = shoot(scene, device, precision, lanes=lanes)
-    points = points_of(film)
-    on_floor = (film["A"] == 1) & (np.abs(points[..., 2] + 1) < 1e-4)
+    framebuffer = shoot(scene, device, precision, lanes=lanes)
+    points = points_of(framebuffer)
+    on_floor = (framebuffer["A"] == 1) & (np.abs(points[..., 2] + 1) < 1e-4)
     toward = -way / np.linalg.norm(way)
     from_ball = points - np.array([0, 0, -0.6])
     along = from_ball @ toward
@@ -76,7 +76,7 @@ def test_a_small_ball_has_its_own_shadow(
     # true ones.
     dark, lit = on_floor & (passes < 0.95), on_floor & (passes > 1.45)
     annulus = lit & (passes < 3)
-    shown = colors(film)[..., 0]
+    shown = colors(framebuffer)[..., 0]
     assert dark.sum() > 8
     assert annulus.sum() > 60
     np.testing.assert_allclose(shown[dark], 0, atol=1e-4)
@@ -112,9 +112,9 @@ def bulb(kind: str, scale: float, mode: str, size: int) -> Scene:
     )
 
 
-def unlike(film: Film, other: Film) -> tuple[float, float]:
+def unlike(framebuffer: Framebuffer, other: Framebuffer) -> tuple[float, float]:
     """How much more light a picture has than another, and the part of its pixels that differ by a fifth of the mean."""
-    a, b = colors(other)[..., 0], colors(film)[..., 0]
+    a, b = colors(other)[..., 0], colors(framebuffer)[..., 0]
     return float(b.mean() / a.mean() - 1), float((np.abs(a - b) > 0.2 * a.mean()).mean())
 
 
@@ -128,8 +128,8 @@ def test_an_object_looks_like_the_scenes_own_formula(device: Device, scale: floa
     own formula already: theirs lies nearer.
     """
     for size in (96, 40):
-        film = shoot(bulb("object", scale, mode, size), device)
-        more, differ = unlike(film, shoot(bulb("main", 1.0, mode, size), device))
+        framebuffer = shoot(bulb("object", scale, mode, size), device)
+        more, differ = unlike(framebuffer, shoot(bulb("main", 1.0, mode, size), device))
         assert abs(more) < (0.008 if mode == "path" else 0.004), size
         assert differ < 0.004, size
 
@@ -160,7 +160,7 @@ def test_nothing_shows_the_ball_in_front_of_a_surface(device: Device, formula: d
         middle = np.array([x, y, 0.4])
         small = {"small": ball_object(formula, scale=scale, position=middle.tolist())}
         alone = shoot(scene_of(wall, camera, (96, 96), **common), device)
-        film = shoot(scene_of(wall, camera, (96, 96), objects=small, **common), device)
+        framebuffer = shoot(scene_of(wall, camera, (96, 96), objects=small, **common), device)
         eye = np.array([0, -8, 0])
         way = points_of(alone) - eye
         way /= np.linalg.norm(way, axis=-1, keepdims=True)
@@ -169,8 +169,8 @@ def test_nothing_shows_the_ball_in_front_of_a_surface(device: Device, formula: d
         around = (alone["A"] == 1) & (passes > 2.8) & (passes < 3.8)
         assert around.sum() > 10
         # Where a ray begins moves its hit by parts of a footprint, which is 0.045 wide.
-        np.testing.assert_allclose(film["Z"][around], alone["Z"][around], atol=0.025)
-        np.testing.assert_allclose(colors(film)[around], colors(alone)[around], atol=5e-3)
+        np.testing.assert_allclose(framebuffer["Z"][around], alone["Z"][around], atol=0.025)
+        np.testing.assert_allclose(colors(framebuffer)[around], colors(alone)[around], atol=5e-3)
 
 
 def test_what_flows_into_another_does_not_flow_into_its_ball(device: Device) -> None:
@@ -188,7 +188,7 @@ def test_what_flows_into_another_does_not_flow_into_its_ball(device: Device) -> 
             "derivative": "dr",
         }
 
-    def joined(own: float, other: float) -> Film:
+    def joined(own: float, other: float) -> Framebuffer:
         drop = {
             "type": "formula",
             "formula": {"inline": ball(0.2, other), "iterations": 1},
@@ -201,7 +201,7 @@ def test_what_flows_into_another_does_not_flow_into_its_ball(device: Device) -> 
 
     wide = joined(1.5, 1.5)
     for own, other in ((0.51, 0.21), (0.6, 0.3)):
-        film = joined(own, other)
-        assert film["A"].mean() == pytest.approx(wide["A"].mean(), rel=2e-3)
-        off = np.abs(colors(film) - colors(wide)).max(-1)
+        framebuffer = joined(own, other)
+        assert framebuffer["A"].mean() == pytest.approx(wide["A"].mean(), rel=2e-3)
+        off = np.abs(colors(framebuffer) - colors(wide)).max(-1)
         assert (off > 0.03).sum() < 10

@@ -14,7 +14,7 @@ from clfractal.device.select import Device
 from clfractal.engine.engine import Engine
 from clfractal.engine.job import StereoPair
 from clfractal.engine.prepare import prepare
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import plan, volume
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName
@@ -59,8 +59,8 @@ def mono_scene(kind: str, camera: dict[str, Any], size: tuple[int, int] = SIZE) 
     return scene_of(BALL, camera, size, **KINDS[kind])
 
 
-def bits(film: Film) -> npt.NDArray[np.uint32]:
-    return stacked(film).view(np.uint32)
+def bits(framebuffer: Framebuffer) -> npt.NDArray[np.uint32]:
+    return stacked(framebuffer).view(np.uint32)
 
 
 @pytest.mark.parametrize("convergence", ["off_axis", "parallel", "toe_in"])
@@ -70,15 +70,15 @@ def test_an_eyes_picture_is_a_mono_one_through_its_view(
 ) -> None:
     """Bit for bit: nothing but the View makes a stereo picture."""
     scene = stereo_scene(kind, convergence=convergence)
-    films = {side: shoot(seen_by(scene, side), device) for side in SIDES}
+    framebuffers = {side: shoot(seen_by(scene, side), device) for side in SIDES}
     for side in SIDES:
         view = scene_view(*seen_by(scene, side))
         monkeypatch.setattr(plan, "scene_view", lambda *_, through=view: through)
         mono = shoot(mono_scene(kind, CAMERA), device)
-        np.testing.assert_array_equal(bits(films[side]), bits(mono))
-    covered = films["left"]["A"] > 0
+        np.testing.assert_array_equal(bits(framebuffers[side]), bits(mono))
+    covered = framebuffers["left"]["A"] > 0
     assert 0.2 < covered.mean() <= 1
-    assert (bits(films["left"]) != bits(films["right"])).any()
+    assert (bits(framebuffers["left"]) != bits(framebuffers["right"])).any()
 
 
 @pytest.mark.parametrize("convergence", ["parallel", "toe_in"])
@@ -112,7 +112,7 @@ def test_an_eye_beside_the_middle_sees_a_part_of_a_wider_picture(device: Device,
         close(shoot(seen_by(scene, side), device), part)
 
 
-def close(found: Film, expected: Any) -> None:
+def close(found: Framebuffer, expected: Any) -> None:
     """The same but for the last digits of rays' directions: a few pixels at a rim may fall to either side."""
     same = found["A"] == expected["A"]
     assert same.mean() > 0.998
@@ -176,7 +176,7 @@ class TestFlat:
     RENDERER: dict[str, Any] = {"type": "cut_plane", "plane": {"width": 3, "height": 3}}  # noqa: RUF012
 
     def test_as_the_renderer(self, device: Device) -> None:
-        films = [
+        framebuffers = [
             shoot(scene_of(BALL, CAMERA, SIZE, renderer=self.RENDERER), device),
             *(
                 shoot(
@@ -185,8 +185,8 @@ class TestFlat:
                 for side in SIDES
             ),
         ]
-        for film in films[1:]:
-            np.testing.assert_array_equal(bits(film), bits(films[0]))
+        for framebuffer in framebuffers[1:]:
+            np.testing.assert_array_equal(bits(framebuffer), bits(framebuffers[0]))
 
     def test_in_a_layout(self, device: Device) -> None:
         """A surface and a plane beside each other, each with half of the screen."""
@@ -194,15 +194,15 @@ class TestFlat:
         scene = scene_of(BALL, CAMERA, SIZE, stereo=VIEWER, layout={"views": views})
         half = (SIZE[0] // 2, SIZE[1])
         both = engine_of(device).render_pair(scene, precision="float32", channels=CHANNELS)
-        films = {side: stacked(film) for side, film in zip(SIDES, both, strict=True)}
+        framebuffers = {side: stacked(framebuffer) for side, framebuffer in zip(SIDES, both, strict=True)}
         plane = stacked(shoot(scene_of(BALL, CAMERA, half, renderer=self.RENDERER), device))
         alone = scene_of(BALL, CAMERA, half, stereo={**VIEWER, "screen_width": 0.5})
         for side in SIDES:
-            np.testing.assert_array_equal(films[side][:, half[0] :], plane)
+            np.testing.assert_array_equal(framebuffers[side][:, half[0] :], plane)
             np.testing.assert_array_equal(
-                films[side][:, : half[0]], stacked(shoot(seen_by(alone, side), device))
+                framebuffers[side][:, : half[0]], stacked(shoot(seen_by(alone, side), device))
             )
-        assert (films["left"] != films["right"]).any()
+        assert (framebuffers["left"] != framebuffers["right"]).any()
 
 
 class TestCost:
@@ -273,7 +273,7 @@ def test_depth_is_measured_from_the_eye_across_the_plane(device: Device) -> None
     """Along the view's axis, which is not where an eye beside the middle looks."""
     scene = stereo_scene()
     view: View = scene_view(*seen_by(scene, "left"))
-    film = shoot(seen_by(scene, "left"), device)
-    hit = film["A"] > 0
-    depth = (points_of(film)[hit] - view.origin) @ view.axis
-    np.testing.assert_allclose(film["Z"][hit], depth, atol=1e-5)
+    framebuffer = shoot(seen_by(scene, "left"), device)
+    hit = framebuffer["A"] > 0
+    depth = (points_of(framebuffer)[hit] - view.origin) @ view.axis
+    np.testing.assert_allclose(framebuffer["Z"][hit], depth, atol=1e-5)

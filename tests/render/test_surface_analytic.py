@@ -44,12 +44,14 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
     one through the ball has to. With `detail` 1, where this ball's radius is some twenty footprints, its normal is that
     at the hit but near the rim, where it is that of a place on the ray before the hit."""
     scene = scene_of(formula, CAMERAS[camera], (80, 60), renderer={"detail": detail})
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, spread = rays(scene)
     _, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
-    depth_scale = np.where(np.isfinite(film["Z"]), film["Z"], 1) if camera == "perspective" else 1.0
+    depth_scale = (
+        np.where(np.isfinite(framebuffer["Z"]), framebuffer["Z"], 1) if camera == "perspective" else 1.0
+    )
     footprint = spread * depth_scale * (1.1 if camera == "perspective" else 1)
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     slack = 2 * detail * footprint + ROUNDING
 
     # The silhouette: every ray through the ball hits, none that passes at a distance does.
@@ -59,7 +61,7 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
     assert 300 < hit.sum() < 0.9 * hit.size
 
     # On the surface, on the pixel's own ray, and the depth of that.
-    points = points_of(film)
+    points = points_of(framebuffer)
     outside = np.linalg.norm(points, axis=-1) - BALL_RADIUS
     assert (outside + 0.1 * detail * footprint)[hit].min() > -ROUNDING
     assert (outside - slack)[hit].max() < 0
@@ -68,10 +70,10 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
     assert off_ray[hit].max() < ROUNDING
     view = view_of(scene)
     depth = (points - view.origin) @ view.axis
-    np.testing.assert_allclose(film["Z"][hit], depth[hit], atol=ROUNDING)
+    np.testing.assert_allclose(framebuffer["Z"][hit], depth[hit], atol=ROUNDING)
 
     # The gradient of |z| is radial: in a plane with the ray, between that at the hit and that well before it.
-    radial, normals = _unit(points), normals_of(film)
+    radial, normals = _unit(points), normals_of(framebuffer)
     beside = np.abs((normals * _unit(np.cross(points, direction))).sum(-1))
     turned = np.degrees(2 * np.arcsin(np.linalg.norm(normals - radial, axis=-1)[hit] / 2))
     before = _unit(points - FARTHEST * detail * footprint[..., None] * direction)
@@ -84,39 +86,39 @@ def test_ball(device: Device, formula: dict[str, Any], camera: str, detail: floa
 
     # What is not hit.
     miss = ~hit
-    assert np.isposinf(film["Z"][miss]).all()
-    assert (film["A"][miss] == 0).all()
+    assert np.isposinf(framebuffer["Z"][miss]).all()
+    assert (framebuffer["A"][miss] == 0).all()
     for name in ("N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations"):
-        assert (film[name][miss] == 0).all(), name
-    colours = stacked(film, [name for name in CHANNELS if name != "Z"])
+        assert (framebuffer[name][miss] == 0).all(), name
+    colours = stacked(framebuffer, [name for name in CHANNELS if name != "Z"])
     assert np.isfinite(colours).all()
-    assert not np.isnan(film["Z"]).any()
+    assert not np.isnan(framebuffer["Z"]).any()
 
 
 def test_depth_against_the_closed_form(device: Device) -> None:
     """With a fine hit distance the depth is the ray's intersection, where the ray does not graze the ball."""
     scene = scene_of(QUICK_BALL, PERSPECTIVE, renderer={"detail": 0.01})
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, spread = rays(scene)
     distance, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
     facing = nearest < 0.9 * BALL_RADIUS  # incidence below 64 degrees
     depth = (distance[..., None] * direction)[facing] @ view_of(scene).axis
     cosine = np.sqrt(1 - 0.9**2)
     assert facing.sum() > 800
-    assert np.abs(film["Z"][facing] - depth).max() < 0.02 * (spread * 3).max() / cosine + ROUNDING
+    assert np.abs(framebuffer["Z"][facing] - depth).max() < 0.02 * (spread * 3).max() / cosine + ROUNDING
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_box_and_sphere(device: Device, camera: str) -> None:
     """Exact distances (a shape of an IFS without a map): the points lie on the solids, with their normals."""
     scene = scene_of(SOLIDS, CAMERAS[camera], (80, 60), renderer={"detail": 0.05})
-    film = shoot(scene, device)
-    hit = film["A"] > 0
-    points, normals = points_of(film)[hit], normals_of(film)[hit]
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] > 0
+    points, normals = points_of(framebuffer)[hit], normals_of(framebuffer)[hit]
     to_center = points - SPHERE_CENTER
     sphere = np.linalg.norm(to_center, axis=-1) - SPHERE_RADIUS
     box = _box_distance(points)
-    footprint = (rays(scene)[2] * (film["Z"] if camera == "perspective" else 1))[hit] * 1.1
+    footprint = (rays(scene)[2] * (framebuffer["Z"] if camera == "perspective" else 1))[hit] * 1.1
     assert np.abs(np.minimum(sphere, box)).max() < (0.055 * footprint).max() + ROUNDING
     on_sphere = sphere < box
     assert on_sphere.sum() > 50
@@ -140,30 +142,30 @@ def test_box_and_sphere(device: Device, camera: str) -> None:
 def test_camera_inside_the_bounds_and_inside_the_solid(device: Device) -> None:
     """From between the box and the sphere everything is seen; from within the ball the surface is at the eye."""
     inner = {"position": [-0.9, -0.9, 0.5], "target": [0.2, -0.1, 0.5], "fov": 60}
-    film = shoot(scene_of(SOLIDS, inner), device)
-    assert 0.3 < film["A"].mean() < 1
-    assert np.isfinite(stacked(film, [name for name in CHANNELS if name != "Z"])).all()
-    film = shoot(scene_of(BALL, {**PERSPECTIVE, "position": [0.1, 0.2, 0.1]}, (32, 32)), device)
-    assert (film["A"] == 1).all()
-    assert np.abs(film["Z"]).max() < 1e-3
-    np.testing.assert_allclose(np.linalg.norm(normals_of(film), axis=-1), 1, atol=1e-5)
+    framebuffer = shoot(scene_of(SOLIDS, inner), device)
+    assert 0.3 < framebuffer["A"].mean() < 1
+    assert np.isfinite(stacked(framebuffer, [name for name in CHANNELS if name != "Z"])).all()
+    framebuffer = shoot(scene_of(BALL, {**PERSPECTIVE, "position": [0.1, 0.2, 0.1]}, (32, 32)), device)
+    assert (framebuffer["A"] == 1).all()
+    assert np.abs(framebuffer["Z"]).max() < 1e-3
+    np.testing.assert_allclose(np.linalg.norm(normals_of(framebuffer), axis=-1), 1, atol=1e-5)
 
 
 def test_nothing_in_sight(device: Device) -> None:
     """A camera that looks away takes no steps."""
-    film = shoot(scene_of(BALL, {"position": [0, -4, 0], "target": [0, -5, 0]}, (32, 32)), device)
-    assert not film["A"].any()
-    assert not film["steps"].any()
-    assert np.isposinf(film["Z"]).all()
+    framebuffer = shoot(scene_of(BALL, {"position": [0, -4, 0], "target": [0, -5, 0]}, (32, 32)), device)
+    assert not framebuffer["A"].any()
+    assert not framebuffer["steps"].any()
+    assert np.isposinf(framebuffer["Z"]).all()
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
 def test_steps_and_bounds(device: Device, camera: str) -> None:
     """Every ray that enters the bounds takes a step, no other does; steps are whole numbers."""
     scene = scene_of(BALL, CAMERAS[camera], (80, 60))
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     _, nearest = to_sphere(*rays(scene)[:2], (0, 0, 0), 1.5)
-    steps = film["steps"]
+    steps = framebuffer["steps"]
     assert (steps[nearest < 1.4999] >= 1).all()
     assert (steps[nearest > 1.5001] == 0).all()
     assert (nearest > 1.5001).any()
@@ -172,22 +174,22 @@ def test_steps_and_bounds(device: Device, camera: str) -> None:
 
 def test_max_steps_ends_a_ray(device: Device) -> None:
     """A ray that is stopped early hits nothing, and says how far it came."""
-    film = shoot(
+    framebuffer = shoot(
         scene_of(QUICK_BALL, PERSPECTIVE, (32, 32), renderer={"max_steps": 3, "detail": 0.01}), device
     )
-    assert film["steps"].max() == 3
-    assert not film["A"].any()
+    assert framebuffer["steps"].max() == 3
+    assert not framebuffer["A"].any()
 
 
 def test_bounds_of_the_scene_cut(device: Device) -> None:
     """Bounds smaller than the ball: only what lies in them is searched, and a ray that starts inside hits there."""
     ball: dict[str, Any] = {"center": [0.5, 0, 0], "radius": 0.7}
     scene = scene_of(BALL, ORTHOGRAPHIC, renderer={"bounds": ball, "detail": 0.05})
-    film = shoot(scene, device)
-    hit = film["A"] > 0
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] > 0
     _, nearest = to_sphere(*rays(scene)[:2], ball["center"], 0.7)
     assert not hit[nearest > 0.7001].any()
-    assert (np.linalg.norm(points_of(film)[hit] - ball["center"], axis=-1) < 0.7001).all()
+    assert (np.linalg.norm(points_of(framebuffer)[hit] - ball["center"], axis=-1) < 0.7001).all()
     assert hit.sum() > 300
 
 

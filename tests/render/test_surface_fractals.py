@@ -65,11 +65,12 @@ def test_normals_and_counts(device: Device, name: str) -> None:
     scene = scene_of(
         formula, CAMERA, (96, 72), lights=[], coloring={"by": COLORING[name]}, renderer={"detail": DETAIL}
     )
-    film = shoot(scene, device)
-    hit = film["A"] > 0
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] > 0
     assert hit.sum() > 800
     points, normals, counts = (
-        each[hit][::3] for each in (points_of(film), normals_of(film), film["iterations"])
+        each[hit][::3]
+        for each in (points_of(framebuffer), normals_of(framebuffer), framebuffer["iterations"])
     )
     to_eye = np.asarray(CAMERA["position"]) - points
     distance = np.linalg.norm(to_eye, axis=-1, keepdims=True)

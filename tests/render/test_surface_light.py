@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.model import Scene
 from tests.render.shots import (
@@ -64,15 +64,15 @@ LIGHTS: dict[str, list[dict[str, Any]]] = {
 def test_equation_5(device: Device, formula: dict[str, Any], lights: str) -> None:
     """A ball shadows no point that faces the light, so every hit pixel has Eq. 5 with s = 1: no acne at any angle."""
     scene = scene_of(formula, PERSPECTIVE, lights=LIGHTS[lights], material=MATERIAL, renderer={"detail": 0.1})
-    film = shoot(scene, device)
-    hit = film["A"] == 1
-    points = points_of(film)
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
+    points = points_of(framebuffer)
     normals = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
     expected = eq5(scene, points, normals, rays(scene)[1])
     assert hit.sum() > 1000
-    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=1e-3)
+    np.testing.assert_allclose(colors(framebuffer)[hit], expected[hit], atol=1e-3)
     if lights == "none":
-        assert not colors(film)[hit].any()
+        assert not colors(framebuffer)[hit].any()
 
 
 @pytest.mark.parametrize("shininess", [0.5, 2.75, 12.5, 3000.0])
@@ -85,12 +85,12 @@ def test_any_shininess(device: Device, shininess: float) -> None:
         scene_of(QUICK_BALL, camera, lights=lights, material=material, renderer={"detail": 0.05})
         for material in (shiny, {**shiny, "specular": 0})
     )
-    film = shoot(scene, device)
-    hit = film["A"] == 1
-    points = points_of(film)
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
+    points = points_of(framebuffer)
     normals = points / np.linalg.norm(points, axis=-1, keepdims=True).clip(1e-9)
     expected = eq5(scene, points, normals, rays(scene)[1])
-    np.testing.assert_allclose(colors(film)[hit], expected[hit], atol=3e-4 + 3e-6 * shininess)
+    np.testing.assert_allclose(colors(framebuffer)[hit], expected[hit], atol=3e-4 + 3e-6 * shininess)
     # The highlight is a good part of what is compared.
     highlight = expected - eq5(dull, points, normals, rays(scene)[1])
     assert highlight[hit].max() > 0.3
@@ -127,11 +127,11 @@ def test_shadow_of_parallel_light(device: Device) -> None:
     scene = scene_of(
         SOLIDS, PERSPECTIVE, (240, 180), lights=[{"direction": direction.tolist()}], material=MATERIAL
     )
-    film = shoot(scene, device)
-    points, top = box_top(film)
+    framebuffer = shoot(scene, device)
+    points, top = box_top(framebuffer)
     toward = -direction / np.linalg.norm(direction)
     _, passing = to_sphere(points, np.broadcast_to(toward, points.shape), SPHERE_CENTER, SPHERE_RADIUS)
-    check_shadow(film, scene, points, top, passing)
+    check_shadow(framebuffer, scene, points, top, passing)
 
 
 def test_shadow_of_a_point_light(device: Device) -> None:
@@ -139,44 +139,48 @@ def test_shadow_of_a_point_light(device: Device) -> None:
     for position, casts in (([0.5, -0.3, 1.8], True), ([0.2, -0.1, 0.4], False)):
         light = {"type": "point", "position": position}
         scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
-        film = shoot(scene, device)
-        points, top = box_top(film)
+        framebuffer = shoot(scene, device)
+        points, top = box_top(framebuffer)
         toward = np.array(position) - points
         toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
         _, passing = to_sphere(points, toward, SPHERE_CENTER, SPHERE_RADIUS)
-        check_shadow(film, scene, points, top, passing if casts else np.full_like(passing, 9.0), some=casts)
+        check_shadow(
+            framebuffer, scene, points, top, passing if casts else np.full_like(passing, 9.0), some=casts
+        )
 
 
 def test_lights_without_shadow_shine_through(device: Device) -> None:
     light = {"direction": [-0.5, 0.3, -1.0], "shadow": False}
     scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
-    film = shoot(scene, device)
-    points, top = box_top(film)
+    framebuffer = shoot(scene, device)
+    points, top = box_top(framebuffer)
     normals = np.broadcast_to(np.array([0.0, 0, 1]), points.shape)
-    np.testing.assert_allclose(colors(film)[top], eq5(scene, points, normals, rays(scene)[1])[top], atol=1e-4)
+    np.testing.assert_allclose(
+        colors(framebuffer)[top], eq5(scene, points, normals, rays(scene)[1])[top], atol=1e-4
+    )
 
 
 def test_light_from_behind_a_surface(device: Device) -> None:
     """The ambient part alone: where the normal turns away from the light, and beneath the box."""
     scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[{"direction": [0, 0, 1]}], material=MATERIAL)
-    film = shoot(scene, device)
-    _, top = box_top(film)
+    framebuffer = shoot(scene, device)
+    _, top = box_top(framebuffer)
     ambient = np.array(MATERIAL["color"]) * MATERIAL["ambient"]
-    np.testing.assert_allclose(colors(film)[top], np.broadcast_to(ambient, (top.sum(), 3)), atol=1e-6)
+    np.testing.assert_allclose(colors(framebuffer)[top], np.broadcast_to(ambient, (top.sum(), 3)), atol=1e-6)
 
 
 def test_coloring_by_normal(device: Device) -> None:
     """The thesis stores (n + 1)/2 as red, green and blue (sec. 3.2.1)."""
     flat = {**MATERIAL, "ambient": 1, "diffuse": 0, "specular": 0}
     scene = scene_of({"name": "hast", "iterations": 8}, PERSPECTIVE, coloring={"by": "normal"}, material=flat)
-    film = shoot(scene, device)
-    hit = film["A"] == 1
-    normals = stacked(film, ("N.X", "N.Y", "N.Z"))
-    np.testing.assert_allclose(colors(film)[hit], (normals[hit] + 1) / 2, atol=1e-6)
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
+    normals = stacked(framebuffer, ("N.X", "N.Y", "N.Z"))
+    np.testing.assert_allclose(colors(framebuffer)[hit], (normals[hit] + 1) / 2, atol=1e-6)
 
 
 def check_shadow(
-    film: Film,
+    framebuffer: Framebuffer,
     scene: Scene,
     points: Floats,
     top: npt.NDArray[np.bool_],
@@ -186,25 +190,25 @@ def check_shadow(
 ) -> None:
     """Dark points have the ambient part of Eq. 5 alone. Shadow rays start three footprints above the surface and count
     as blocked within one footprint of it: nearer than six to the rim either is right."""
-    footprint = (rays(scene)[2] * np.where(top, film["Z"], 1)) * 1.1
+    footprint = (rays(scene)[2] * np.where(top, framebuffer["Z"], 1)) * 1.1
     dark = top & (passing < SPHERE_RADIUS - 6 * footprint)
     lit = top & (passing > SPHERE_RADIUS + 6 * footprint)
     normals = np.broadcast_to(np.array([0.0, 0, 1]), points.shape)
     full = eq5(scene, points, normals, rays(scene)[1])
     ambient = eq5(scene, points, normals, rays(scene)[1], lit=False)
     assert lit.sum() > 1000
-    np.testing.assert_allclose(colors(film)[lit], full[lit], atol=2e-4)
-    np.testing.assert_allclose(colors(film)[dark], ambient[dark], atol=1e-5)
+    np.testing.assert_allclose(colors(framebuffer)[lit], full[lit], atol=2e-4)
+    np.testing.assert_allclose(colors(framebuffer)[dark], ambient[dark], atol=1e-5)
     if some:
         assert dark.sum() > 150
 
 
-def box_top(film: Film) -> tuple[Floats, npt.NDArray[np.bool_]]:
+def box_top(framebuffer: Framebuffer) -> tuple[Floats, npt.NDArray[np.bool_]]:
     """Positions, moved down onto the plane z = 0, and which pixels show the box's top, away from its edges and
     from the sphere."""
-    points = points_of(film)
-    top = (film["A"] > 0) & (np.abs(points[..., 2]) < 0.1) & (np.abs(points[..., :2]).max(-1) < 1.1)
-    top &= film["N.Z"] > 0.9999
+    points = points_of(framebuffer)
+    top = (framebuffer["A"] > 0) & (np.abs(points[..., 2]) < 0.1) & (np.abs(points[..., :2]).max(-1) < 1.1)
+    top &= framebuffer["N.Z"] > 0.9999
     return points, top
 
 
@@ -238,6 +242,6 @@ def eq5(scene: Scene, points: Floats, normals: Floats, directions: Floats, *, li
 
 
 def colors(
-    film: Film | Mapping[str, npt.NDArray[np.float32]], names: Sequence[str] = ("R", "G", "B")
+    framebuffer: Framebuffer | Mapping[str, npt.NDArray[np.float32]], names: Sequence[str] = ("R", "G", "B")
 ) -> npt.NDArray[np.float32]:
-    return np.stack([film[name] for name in names], axis=-1)
+    return np.stack([framebuffer[name] for name in names], axis=-1)

@@ -17,7 +17,7 @@ from clfractal.device.select import Device
 from clfractal.files import resources
 from clfractal.files.environment_map import read_environment
 from clfractal.files.exr import write_exr
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.march import march_record
 from clfractal.integrators.records import HemisphereRays, hemisphere_rays
 from clfractal.scene.model import Scene
@@ -66,8 +66,8 @@ def disk(count: int) -> Floats:
 def test_soft_shadow_is_the_part_of_the_lamp_that_is_hidden(device: Device, size: float) -> None:
     way = np.array([0.5, 0.3, -1.0])
     light = {"direction": way.tolist(), "angular_size": size, "rays": 16}
-    film = shoot(solids(light, {"diffuse": 1}), device)
-    on_ground = ground(film)
+    framebuffer = shoot(solids(light, {"diffuse": 1}), device)
+    on_ground = ground(framebuffer)
     axis = -way / np.linalg.norm(way)
     side = np.cross(axis, [0, 0, 1]) / np.linalg.norm(np.cross(axis, [0, 0, 1]))
     places = disk(400)
@@ -75,10 +75,10 @@ def test_soft_shadow_is_the_part_of_the_lamp_that_is_hidden(device: Device, size
     height = 1 - (places**2).sum(-1) * (1 - np.cos(np.radians(size / 2)))
     turn = places / np.linalg.norm(places, axis=-1, keepdims=True) * np.sqrt(1 - height**2)[:, None]
     toward = height[:, None] * axis + turn[:, :1] * side + turn[:, 1:] * np.cross(axis, side)
-    points = points_of(film)[on_ground]
+    points = points_of(framebuffer)[on_ground]
     free = to_sphere(points[:, None], toward[None], SPHERE_CENTER, SPHERE_RADIUS)[1] > SPHERE_RADIUS
     expected = (free * np.maximum(toward[:, 2], 0)).mean(axis=1)
-    error = colors(film)[on_ground][:, 0] - expected
+    error = colors(framebuffer)[on_ground][:, 0] - expected
     assert on_ground.sum() > 800
     assert expected.min() < 0.1 * expected.max() or size > 40
     # Rays see the ball half a footprint too large, and a pixel at an edge averages what its middle does not show.
@@ -92,12 +92,12 @@ def test_hard_and_soft_lights_together(device: Device, order: tuple[int, int]) -
     """Each light has its own number of rays, and brings as much light as it does alone."""
     soft = {"direction": [0.5, 0.3, -1.0], "angular_size": 4, "rays": 8, "color": [1, 0, 0]}
     hard = {"direction": [-0.4, 0.1, -1.0], "intensity": 0.5, "color": [0, 1, 0]}
-    film = shoot(solids([(soft, hard)[number] for number in order], {"diffuse": 1}), device)
-    on_ground = ground(film)
+    framebuffer = shoot(solids([(soft, hard)[number] for number in order], {"diffuse": 1}), device)
+    on_ground = ground(framebuffer)
     softly, hardly = (
         colors(shoot(solids(light, {"diffuse": 1}), device))[on_ground] for light in (soft, hard)
     )
-    together = colors(film)[on_ground]
+    together = colors(framebuffer)[on_ground]
     np.testing.assert_allclose(together[:, 1], hardly[:, 1], atol=1e-6)
     # Another place among the lights, other places on the lamp: only their mean is the same.
     np.testing.assert_allclose(together[:, 0], softly[:, 0], atol=0.15)
@@ -113,8 +113,8 @@ def test_rays_that_go_together_lose_no_number(device: Device) -> None:
             settings = {"step_scale": scale, "over_relaxation": 1, "ambient_occlusion": occlusion}
             scene = scene_of(formula, PERSPECTIVE, lights=[], renderer=settings)
             plan = plan_of(scene, device)
-            film = Film(plan.channels, (64, 64), plan.region)
-            found.append((film, render_planned(scene, plan, device, film).bad_distances))
+            framebuffer = Framebuffer(plan.channels, (64, 64), plan.region)
+            found.append((framebuffer, render_planned(scene, plan, device, framebuffer).bad_distances))
         (alone, bad), (together, bad_together) = found
         for name in ("A", "Z", "N.X", "N.Y", "N.Z", "iterations", "steps"):
             np.testing.assert_allclose(together[name], alone[name], rtol=1e-5, atol=1e-6, err_msg=name)
@@ -126,18 +126,18 @@ def test_rays_that_go_together_lose_no_number(device: Device) -> None:
 def test_ambient_occlusion_is_the_part_of_the_hemisphere_that_is_covered(device: Device) -> None:
     """A ball above the horizon takes (R/d)^2 cos(angle) of the cosine-weighted hemisphere (Nusselt 1928)."""
     light = {"direction": [0, 0, -1], "angular_size": 1, "rays": 1, "shadow": False}
-    film = shoot(solids(light, {"ambient": 1}, rays=32, distance=4), device)
-    on_ground = ground(film)
-    offset = SPHERE_CENTER - points_of(film)[on_ground]
+    framebuffer = shoot(solids(light, {"ambient": 1}, rays=32, distance=4), device)
+    on_ground = ground(framebuffer)
+    offset = SPHERE_CENTER - points_of(framebuffer)[on_ground]
     distance = np.linalg.norm(offset, axis=-1)
     expected = 1 - SPHERE_RADIUS**2 * offset[:, 2] / distance**3
-    error = colors(film)[on_ground][:, 0] - expected
+    error = colors(framebuffer)[on_ground][:, 0] - expected
     assert expected.min() < 0.92
     assert abs(error.mean()) < 0.004
     assert np.quantile(np.abs(error), 0.99) < 0.03
     # What is farther away than `distance` hides nothing: here the ball, 0.6 above the box.
-    film = shoot(solids(light, {"ambient": 1}, rays=32, distance=0.59), device)
-    assert (colors(film)[ground(film)] > 1 - 1e-6).all()
+    framebuffer = shoot(solids(light, {"ambient": 1}, rays=32, distance=0.59), device)
+    assert (colors(framebuffer)[ground(framebuffer)] > 1 - 1e-6).all()
 
 
 def environment_scene(folder: Path, environment: dict[str, Any], reflection: float, **settings: Any) -> Scene:
@@ -181,18 +181,18 @@ def test_what_is_mirrored_and_seen_is_the_environment(
     """The whole picture: past the ball the map itself, on the ball the map in the mirrored direction, right side up."""
     environment = {"name": "dusk", "rotation": rotation, "rays": count}
     scene = environment_scene(tmp_path, environment, 1.0, bounces=1, detail=0.05)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     direction = rays(scene)[1]
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     # Where the ball was hit, up to half a footprint off, matters to a mirror: so the normal that was found there.
-    normal = normals_of(film)
+    normal = normals_of(framebuffer)
     mirrored = direction - 2 * (direction * normal).sum(-1, keepdims=True) * normal
     toward = np.where(hit[..., None], mirrored, direction)
     expected = look_up(shipped("dusk"), toward, rotation)
     assert 0.2 < hit.mean() < 0.8
-    assert (np.abs(colors(film) - expected) <= 0.005 + 0.02 * expected).mean() > 0.999
-    assert (np.abs(colors(film) - expected) <= 0.01 + 0.1 * expected).all()
-    points = points_of(film)[hit]
+    assert (np.abs(colors(framebuffer) - expected) <= 0.005 + 0.02 * expected).mean() > 0.999
+    assert (np.abs(colors(framebuffer) - expected) <= 0.01 + 0.1 * expected).all()
+    points = points_of(framebuffer)[hit]
     np.testing.assert_allclose(normal[hit], points / np.linalg.norm(points, axis=-1)[:, None], atol=1e-4)
 
 
@@ -231,12 +231,14 @@ def test_under_a_white_sky_a_ball_has_its_own_colour(
         half="RGB",
     )
     scene = environment_scene(tmp_path, {"file": "white.exr", "rays": 32}, reflection, bounces=2, samples=4)
-    film = shoot(scene, device)
-    inside = film["A"] == 1
+    framebuffer = shoot(scene, device)
+    inside = framebuffer["A"] == 1
     expected = (1 - reflection) * 0.9 * np.array([0.8, 0.5, 0.2]) + reflection
-    np.testing.assert_allclose(colors(film)[inside].mean(axis=0), expected, rtol=0.005)
-    np.testing.assert_allclose(colors(film)[inside], np.broadcast_to(expected, (inside.sum(), 3)), rtol=0.12)
-    np.testing.assert_allclose(colors(film)[film["A"] == 0], 1.0, atol=1e-5)
+    np.testing.assert_allclose(colors(framebuffer)[inside].mean(axis=0), expected, rtol=0.005)
+    np.testing.assert_allclose(
+        colors(framebuffer)[inside], np.broadcast_to(expected, (inside.sum(), 3)), rtol=0.12
+    )
+    np.testing.assert_allclose(colors(framebuffer)[framebuffer["A"] == 0], 1.0, atol=1e-5)
 
 
 def irradiance(pixels: Floats, normals: Floats) -> Floats:
@@ -261,13 +263,13 @@ def test_a_ball_under_a_sky_that_is_brighter_on_one_side(
     open_part = None if occlusion is None else {"rays": occlusion}
     environment = {"name": "dusk", "rays": light_rays}
     scene = environment_scene(tmp_path, environment, 0.0, samples=16, ambient_occlusion=open_part)
-    film = shoot(scene, device)
-    hit = film["A"] == 1
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
     # Halved: the sum over 16 times fewer pixels is the same to a thousandth.
     sky = shipped("dusk")
     sky = sky.reshape(sky.shape[0] // 4, 4, sky.shape[1] // 4, 4, 3).mean(axis=(1, 3))
-    expected = 0.9 * np.array([0.8, 0.5, 0.2]) * irradiance(sky, normals_of(film)[hit])
-    found = colors(film)[hit]
+    expected = 0.9 * np.array([0.8, 0.5, 0.2]) * irradiance(sky, normals_of(framebuffer)[hit])
+    found = colors(framebuffer)[hit]
     assert expected.max() > 3 * expected.min()
     np.testing.assert_allclose(found.mean(axis=0), expected.mean(axis=0), rtol=0.01)
     bright = expected[:, 0] > np.median(expected[:, 0])

@@ -38,13 +38,13 @@ RGB = ("R", "G", "B")
 def test_background(device: Device) -> None:
     """Linear between its colours from the picture's upper rim to its lower one."""
     scene = scene_of(QUICK_BALL, PERSPECTIVE, (40, 50), background=GRADIENT)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     share = ((np.arange(50) + 0.5) / 50)[:, None, None]
     expected = (1 - share) * np.array(GRADIENT["top"]) + share * np.array(GRADIENT["bottom"])
-    miss = film["A"] == 0
+    miss = framebuffer["A"] == 0
     assert miss.sum() > 500
     np.testing.assert_allclose(
-        stacked(film, RGB)[miss], np.broadcast_to(expected, (50, 40, 3))[miss], rtol=1e-6
+        stacked(framebuffer, RGB)[miss], np.broadcast_to(expected, (50, 40, 3))[miss], rtol=1e-6
     )
 
 
@@ -59,14 +59,16 @@ def test_background_of_a_region(device: Device) -> None:
 def test_transparent(device: Device, samples: int) -> None:
     """R, G, B are premultiplied: the colour times the coverage, 0 where nothing is hit."""
     scene = scene_of(QUICK_BALL, PERSPECTIVE, background="transparent", **FLAT)
-    film = shoot(scene, device, samples=samples)
-    coverage = film["A"]
+    framebuffer = shoot(scene, device, samples=samples)
+    coverage = framebuffer["A"]
     if samples == 1:
         assert set(np.unique(coverage)) == {0, 1}
     else:
         assert np.array_equal(coverage * 16, np.round(coverage * 16))
         assert len(np.unique(coverage)) > 5
-    np.testing.assert_allclose(stacked(film, RGB), coverage[..., None] * np.array([0.25, 0.5, 1]), rtol=1e-6)
+    np.testing.assert_allclose(
+        stacked(framebuffer, RGB), coverage[..., None] * np.array([0.25, 0.5, 1]), rtol=1e-6
+    )
 
 
 @pytest.mark.parametrize("samples", [16, 64])
@@ -105,11 +107,11 @@ def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None
 def test_averages_are_of_linear_light(device: Device) -> None:
     """A pixel half covered has the mean of the numbers in R, G, B, whatever the exposure of a PNG would be."""
     same = {"top": [0.1, 0.2, 3.0], "bottom": [0.1, 0.2, 3.0]}
-    film = shoot(scene_of(QUICK_BALL, PERSPECTIVE, background=same, **FLAT), device, samples=8)
-    a = film["A"][..., None]
+    framebuffer = shoot(scene_of(QUICK_BALL, PERSPECTIVE, background=same, **FLAT), device, samples=8)
+    a = framebuffer["A"][..., None]
     assert ((a > 0) & (a < 1)).any()
     np.testing.assert_allclose(
-        stacked(film, RGB), a * np.array([0.25, 0.5, 1]) + (1 - a) * np.array(same["top"]), rtol=2e-6
+        stacked(framebuffer, RGB), a * np.array([0.25, 0.5, 1]) + (1 - a) * np.array(same["top"]), rtol=2e-6
     )
 
 
@@ -117,24 +119,24 @@ def test_averages_are_of_linear_light(device: Device) -> None:
 def test_data_channels_take_the_nearest_sample(device: Device, samples: int) -> None:
     """Depth, point and normal of one ray, that of the sample nearest to the pixel's centre: hit or not, no averages."""
     scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (48, 48), renderer={"detail": 0.01, "seed": 7})
-    film = shoot(scene, device, samples=samples)
+    framebuffer = shoot(scene, device, samples=samples)
     across, below = sample_places(48, 48, samples, 7)
     chosen = ((across - 0.5) ** 2 + (below - 0.5) ** 2).argmin(axis=-1)[..., None]
     u, v = (np.take_along_axis(place, chosen, axis=-1)[..., 0] for place in (across, below))
     origin, direction, _ = rays(scene, u, v)
     distance, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
     sure = np.abs(nearest - BALL_RADIUS) > 1e-2
-    hit = np.isfinite(film["Z"])
+    hit = np.isfinite(framebuffer["Z"])
     assert np.array_equal(hit[sure], np.isfinite(distance)[sure])
-    points, facing = points_of(film), nearest < 0.9 * BALL_RADIUS
+    points, facing = points_of(framebuffer), nearest < 0.9 * BALL_RADIUS
     expected = origin + np.where(np.isfinite(distance), distance, 0)[..., None] * direction
     np.testing.assert_allclose(points[facing], expected[facing], atol=5e-3)
     # On that ray, to rounding: a mean of two rays would lie beside it.
     offset = points - origin
     aside = offset - (offset * direction).sum(-1, keepdims=True) * direction
     assert np.abs(aside[hit]).max() < 2e-6
-    np.testing.assert_allclose(np.linalg.norm(normals_of(film)[hit], axis=-1), 1, atol=1e-5)
-    assert np.isfinite(stacked(film, [name for name in CHANNELS if name != "Z"])).all()
+    np.testing.assert_allclose(np.linalg.norm(normals_of(framebuffer)[hit], axis=-1), 1, atol=1e-5)
+    assert np.isfinite(stacked(framebuffer, [name for name in CHANNELS if name != "Z"])).all()
 
 
 def test_samples_are_stratified() -> None:

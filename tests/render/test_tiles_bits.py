@@ -16,8 +16,8 @@ from clfractal.engine import drawing
 from clfractal.engine import local_executor as local
 from clfractal.engine.run import Progress
 from clfractal.engine.stages import Span
-from clfractal.images.film import Film
-from clfractal.images.store import JournalFilm
+from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
@@ -136,12 +136,12 @@ def test_tiles_in_parts(
     launches: list[int] = []
     scene = SCENES[name]
     plan = plan_of(scene, device)
-    film = Film(plan.channels, SIZE, plan.region)
+    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
     state = render_planned(
         scene,
         plan,
         device,
-        film,
+        framebuffer,
         progress=lambda progress: launches.append(progress.tiles_done),
         budget_seconds=1e-9,
     )
@@ -149,7 +149,7 @@ def test_tiles_in_parts(
     assert len(launches) >= 10 * plan.samples * TILE * TILE // plan.lanes
     assert launches == sorted(launches)
     assert state.tiles_done == 12
-    assert same(stacked(film), wholes[name])
+    assert same(stacked(framebuffer), wholes[name])
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -168,16 +168,16 @@ def test_groups_of_tiles_in_parts(
     monkeypatch.setattr(drawing.Drawing, "start", noted)
     scene = SCENES[name]
     plan = plan_of(scene, device)
-    film = Film(plan.channels, SIZE, plan.region)
+    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
     # No launch teaches the next one another size: of four tiles with one sample.
     monkeypatch.setattr(Pace, "learn", lambda *about: None)
     monkeypatch.setattr(
         Pace, "begin", lambda self: setattr(self, "size", 4.0 * TILE * TILE // plan.lanes + 1)
     )
-    state = render_planned(scene, plan, device, film)
+    state = render_planned(scene, plan, device, framebuffer)
     assert spans == [(4, (sample, sample + 1)) for _ in range(3) for sample in range(plan.samples)]
     assert state.rays == plan.samples * SIZE[0] * SIZE[1]
-    assert same(stacked(film), wholes[name])
+    assert same(stacked(framebuffer), wholes[name])
 
 
 def test_statistics_do_not_depend_on_batches(device: Device) -> None:
@@ -186,8 +186,8 @@ def test_statistics_do_not_depend_on_batches(device: Device) -> None:
     plan = plan_of(scene, device)
 
     def counted(budget_seconds: float | None = None) -> tuple[int, int, int, int]:
-        film = Film(plan.channels, SIZE, plan.region)
-        state = render_planned(scene, plan, device, film, budget_seconds=budget_seconds)
+        framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+        state = render_planned(scene, plan, device, framebuffer, budget_seconds=budget_seconds)
         return state.rays, state.steps, state.iterations, state.bad_distances
 
     at_once = counted()
@@ -197,19 +197,21 @@ def test_statistics_do_not_depend_on_batches(device: Device) -> None:
 
 
 def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
-    """A film half filled with another render's tiles is completed, and what is there stays."""
+    """A framebuffer half filled with another render's tiles is completed, and what is there stays."""
     scene = SCENES["mandelbulb"]
     plan = plan_of(scene, device)
-    film = Film(plan.channels, SIZE, plan.region)
+    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
     for index in (1, 5, 6, 10):
-        film.put(index, render_tile(scene, plan, device, film.grid.tile(index)))
-    marked = film.grid.tile(11)
-    film.put(11, np.full((len(CHANNELS), marked.height, marked.width), 7, np.float32))
+        framebuffer.put(index, render_tile(scene, plan, device, framebuffer.grid.tile(index)))
+    marked = framebuffer.grid.tile(11)
+    framebuffer.put(11, np.full((len(CHANNELS), marked.height, marked.width), 7, np.float32))
     seen: list[tuple[int, int]] = []
-    render_planned(scene, plan, device, film, progress=lambda p: seen.append((p.tiles_before, p.tiles_done)))
+    render_planned(
+        scene, plan, device, framebuffer, progress=lambda p: seen.append((p.tiles_before, p.tiles_done))
+    )
     assert all(before == 5 for before, _ in seen)
     assert seen[-1] == (5, 12)
-    result = stacked(film)
+    result = stacked(framebuffer)
     assert (result[marked.y :, marked.x :] == 7).all()
     result[marked.y :, marked.x :] = wholes["mandelbulb"][marked.y :, marked.x :]
     assert same(result, wholes["mandelbulb"])
@@ -231,25 +233,25 @@ def test_interrupted_and_resumed(
             raise KeyboardInterrupt
 
     path = tmp_path / "picture.partial"
-    first = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region)
+    first = JournalFramebuffer(path, {"scene": "hast"}, plan.channels, SIZE, plan.region)
     with pytest.raises(KeyboardInterrupt):
         render_planned(scene, plan, device, first, progress=stop)
     first.close()
-    again = JournalFilm(path, {"scene": "hast"}, plan.channels, SIZE, plan.region, resume=True)
+    again = JournalFramebuffer(path, {"scene": "hast"}, plan.channels, SIZE, plan.region, resume=True)
     assert again.done.sum() == 5
     render_planned(scene, plan, device, again)
     assert again.done.all()
-    assert same(stacked(again.to_film()), wholes["hast"])
+    assert same(stacked(again.to_framebuffer()), wholes["hast"])
     again.discard()
 
 
 def test_fewer_channels_are_the_same(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
     """A channel does not depend on which others are wanted, nor on their order."""
     names = ("Z", "R", "N.Y")
-    film = shoot(SCENES["mandelbulb"], device, channels=names)
+    framebuffer = shoot(SCENES["mandelbulb"], device, channels=names)
     for name in names:
         expected = wholes["mandelbulb"][..., CHANNELS.index(name)]
-        assert same(film[name], np.ascontiguousarray(expected)), name
+        assert same(framebuffer[name], np.ascontiguousarray(expected)), name
 
 
 @pytest.mark.combination

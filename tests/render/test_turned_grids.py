@@ -82,19 +82,19 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def check_ball(film: Any, scene: Scene, steps: Floats) -> None:
+def check_ball(framebuffer: Any, scene: Scene, steps: Floats) -> None:
     """The ball is where it is, and so are its normals."""
     origin, direction, _ = rays(scene)
     t, nearest = to_sphere(origin, direction, CENTER, RADIUS)
-    hit, voxel = film["A"] == 1, float(np.linalg.norm(steps, axis=1).max())
+    hit, voxel = framebuffer["A"] == 1, float(np.linalg.norm(steps, axis=1).max())
     sure = np.abs(nearest - RADIUS) > 0.15 * voxel
     np.testing.assert_array_equal(hit[sure], (nearest < RADIUS)[sure])
     clear = nearest < 0.8 * RADIUS
     assert clear.sum() > 200
     expected = origin + np.where(clear, t, 0)[..., None] * direction
-    assert np.linalg.norm(points_of(film) - expected, axis=-1)[clear].max() < 0.15 * voxel
-    outward = points_of(film) - CENTER
-    cosine = ((normals_of(film) * outward).sum(-1) / np.linalg.norm(outward, axis=-1))[clear]
+    assert np.linalg.norm(points_of(framebuffer) - expected, axis=-1)[clear].max() < 0.15 * voxel
+    outward = points_of(framebuffer) - CENTER
+    cosine = ((normals_of(framebuffer) * outward).sum(-1) / np.linalg.norm(outward, axis=-1))[clear]
     assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 0.5
 
 
@@ -134,11 +134,11 @@ def test_an_object_is_scaled_along_the_files_axes_and_then_turned(device: Device
         rotation=[0, 0, 90],
         position=[0.1, 0, 0],
     )
-    film = shoot(scene, device)
-    hit = film["A"] == 1
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
     assert hit.sum() > 200
     # Back to the file's own space: x was turned to y, and y to -x.
-    x, y, z = np.moveaxis(points_of(film) - [0.1, 0, 0], -1, 0)
+    x, y, z = np.moveaxis(points_of(framebuffer) - [0.1, 0, 0], -1, 0)
     back = np.stack([y, -x, z], -1) / factors
     voxel = float(np.linalg.norm(steps, axis=1).max())
     assert np.abs(depth(back))[hit].max() < 0.15 * voxel
@@ -154,7 +154,7 @@ def test_places_one_by_one(device: Device, folder: Path, name: str) -> None:
     colors = [{"at": -0.5, "color": [1, 0, 0.25]}, {"at": 0.5, "color": [0.25, 1, 0]}]
     transfer = {"opacity": OPACITY, "color": colors}
     scene = volume_scene(PERSPECTIVE, folder=folder, file=file_of(name), transfer=transfer, look=FLAT)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
 
     def look(values: Floats) -> tuple[Floats, Floats]:
         tints = [np.interp(values, [-0.5, 0.5], ends) for ends in ([1, 0.25], [0, 1], [0.25, 0])]
@@ -162,10 +162,10 @@ def test_places_one_by_one(device: Device, folder: Path, name: str) -> None:
 
     values = read_volume(folder / file_of(name)).values
     color, opacity = composited(scene, values, origin_of(steps) - steps.sum(0) / 2, steps, look)
-    off = np.abs(film["A"] - opacity) > 2e-4
-    off |= np.abs(stacked(film, "RGB") - color).max(-1) > 2e-3
+    off = np.abs(framebuffer["A"] - opacity) > 2e-4
+    off |= np.abs(stacked(framebuffer, "RGB") - color).max(-1) > 2e-3
     assert off.mean() < 0.004
-    assert 0.1 < (film["A"] > 0.5).mean() < 0.9
+    assert 0.1 < (framebuffer["A"] > 0.5).mean() < 0.9
 
 
 @pytest.mark.parametrize("name", STEPS)
@@ -211,8 +211,8 @@ def test_the_bar_that_is_turned_by_thirty_degrees(device: Device, tmp_path: Path
     scene = volume_scene(
         camera, folder=tmp_path, file="bar.nrrd", transfer=transfer, look=FLAT, size=(96, 96)
     )
-    film = shoot(scene, device)
-    seen = points_of(film)[film["A"] > 0.5]
+    framebuffer = shoot(scene, device)
+    seen = points_of(framebuffer)[framebuffer["A"] > 0.5]
     index = np.linalg.solve(steps.T, (seen - [-1, -1.5, -1]).T)
     # From half a voxel before the first to half a voxel past the last, to a pixel and the values between.
     np.testing.assert_allclose(index.min(1)[:2], [1.5, 9.5], atol=0.7)
@@ -238,7 +238,7 @@ def test_a_grid_that_moves_is_shown_anew(tmp_path: Path, device: Device) -> None
         write_volume(tmp_path / "v.nrrd", Volume(values, at, STEPS["turned"]))
         scene = volume_scene(ORTHOGRAPHIC, folder=tmp_path, file="v.nrrd", level=0.0)
         found.append(engine.render(scene, precision="float32", channels=("R", "G", "B", "A")))
-    first, second = (np.mean(np.nonzero(film["A"] == 1)[1]) for film in found)
+    first, second = (np.mean(np.nonzero(framebuffer["A"] == 1)[1]) for framebuffer in found)
     assert second - first > 3
 
 

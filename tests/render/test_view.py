@@ -87,16 +87,16 @@ def test_world_to_ndc(camera: str, size: tuple[int, int]) -> None:
 def test_rendered_points_are_where_their_pixels_are(device: Device, camera: str) -> None:
     """P of every hit pixel, projected by the matrix in the file, is that pixel's centre; its depth is Z."""
     scene = scene_of(BALL, CAMERAS[camera], (90, 40))
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     view = view_of(scene)
-    hit = film["A"] > 0
+    hit = framebuffer["A"] > 0
     assert hit.sum() > 200
-    points = np.concatenate([points_of(film)[hit], np.ones((hit.sum(), 1))], axis=-1)
+    points = np.concatenate([points_of(framebuffer)[hit], np.ones((hit.sum(), 1))], axis=-1)
     projected = points @ view.world_to_ndc()
     pixels = projected[:, :2] / projected[:, 3:] * [90, 40]
     rows, columns = np.nonzero(hit)
     np.testing.assert_allclose(pixels, np.stack([columns + 0.5, rows + 0.5], axis=-1), atol=1e-3)
-    np.testing.assert_allclose((points @ view.world_to_camera())[:, 2], film["Z"][hit], atol=3e-6)
+    np.testing.assert_allclose((points @ view.world_to_camera())[:, 2], framebuffer["Z"][hit], atol=3e-6)
     # And it is the near side of the ball.
     origin = rays(scene)[0][hit]
     assert (

@@ -192,14 +192,14 @@ def test_samples(device: Device, tmp_path: Path) -> None:
         samples=64,
         size=(15, 15),
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     edges = np.clip((np.arange(16) - 7.5) * 1.6 / 15, -0.5, 0.5)
     part = np.diff(edges) / (1.6 / 15)
-    np.testing.assert_allclose(film["A"], part[:, None] * part[None], atol=0.05)
-    assert film["A"].sum() * (1.6 / 15) ** 2 == pytest.approx(1, rel=5e-3)
+    np.testing.assert_allclose(framebuffer["A"], part[:, None] * part[None], atol=0.05)
+    assert framebuffer["A"].sum() * (1.6 / 15) ** 2 == pytest.approx(1, rel=5e-3)
     color = np.array(FLAT["material"]["color"])
-    np.testing.assert_allclose(stacked(film, "RGB"), film["A"][..., None] * color, atol=1e-5)
-    assert (film["samples"] == 64).all()
+    np.testing.assert_allclose(stacked(framebuffer, "RGB"), framebuffer["A"][..., None] * color, atol=1e-5)
+    assert (framebuffer["samples"] == 64).all()
     # A ray that nothing changes needs no more samples than the fewest.
     scene = volume_scene(
         camera,
@@ -211,9 +211,9 @@ def test_samples(device: Device, tmp_path: Path) -> None:
         min_samples=8,
         size=(15, 15),
     )
-    film = shoot(scene, device)
-    assert set(film["samples"][4:11, 4:11].flat) == {8}
-    assert film["samples"][2, 4:11].min() > 30
+    framebuffer = shoot(scene, device)
+    assert set(framebuffer["samples"][4:11, 4:11].flat) == {8}
+    assert framebuffer["samples"][2, 4:11].min() > 30
 
 
 @pytest.mark.parametrize(
@@ -246,14 +246,14 @@ def test_files_whose_axes_run_otherwise(device: Device, tmp_path: Path, turn: li
     k, j, i = np.meshgrid(*(np.arange(n) for n in sides[::-1]), indexing="ij")
     places = first + i[..., None] * steps[0] + j[..., None] * steps[1] + k[..., None] * steps[2]
     write_volume(tmp_path / "turned.nrrd", Volume(object_at(places), first, steps))
-    films = [
+    framebuffers = [
         shoot(volume_scene(PERSPECTIVE, folder=tmp_path, file=f"{name}.nrrd", look=LIT), device)
         for name in ("straight", "turned")
     ]
-    np.testing.assert_allclose(stacked(films[1], "RGBA"), stacked(films[0], "RGBA"), atol=2e-3)
-    assert films[0]["A"].mean() > 0.05
+    np.testing.assert_allclose(stacked(framebuffers[1], "RGBA"), stacked(framebuffers[0], "RGBA"), atol=2e-3)
+    assert framebuffers[0]["A"].mean() > 0.05
     # The small ball is where it is: left of the middle, and low.
-    low = points_of(films[1])[films[1]["P.Z"] < -0.3]
+    low = points_of(framebuffers[1])[framebuffers[1]["P.Z"] < -0.3]
     assert (np.linalg.norm(low - [-0.6, 0.3, -0.4], axis=-1) < 0.25).all()
 
 

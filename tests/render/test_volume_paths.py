@@ -112,10 +112,10 @@ def test_what_comes_through(device: Device, folder: Path) -> None:
     scene = medium(folder, samples=1024, **BLACK, **WHITE)
     _, _, near, far = within(scene)
     expected = np.exp(-SIGMA * (far - near))
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     assert expected.min() < 0.2
-    assert_alike(film["R"], expected, 0.5 / 32)
-    np.testing.assert_allclose(film["A"], 1 - film["R"], atol=1e-5)
+    assert_alike(framebuffer["R"], expected, 0.5 / 32)
+    np.testing.assert_allclose(framebuffer["A"], 1 - framebuffer["R"], atol=1e-5)
 
 
 @pytest.mark.parametrize(("file", "steps"), [("waves.nrrd", VOXEL * np.eye(3)), ("oblique.nrrd", OBLIQUE)])

@@ -109,7 +109,7 @@ def test_opacity_of_a_ball_of_one_density(device: Device, folder: Path, camera: 
     scene = volume_scene(
         CAMERAS[camera], folder=folder, file="ball.nrrd", transfer=FOG, step=0.1, opacity_limit=1
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     nearest = to_sphere(*rays(scene)[:2], CENTER, RADIUS)[1]
 
     def opacity(radius: float) -> Floats:
@@ -119,12 +119,14 @@ def test_opacity_of_a_ball_of_one_density(device: Device, folder: Path, camera: 
     clear = nearest < 0.9 * RADIUS
     assert clear.sum() > 250
     for where, off in ((clear, 0.2 * VOXEL), (nearest >= 0, 2 * VOXEL)):
-        assert (film["A"] >= opacity(RADIUS - off) - ROUNDING)[where].all()
-        assert (film["A"] <= opacity(RADIUS + off) + ROUNDING)[where].all()
+        assert (framebuffer["A"] >= opacity(RADIUS - off) - ROUNDING)[where].all()
+        assert (framebuffer["A"] <= opacity(RADIUS + off) + ROUNDING)[where].all()
     outside = nearest > RADIUS + VOXEL * (0.5 + np.sqrt(3))
-    assert not film["A"][outside].any()
+    assert not framebuffer["A"][outside].any()
     # Over nothing, colours are premultiplied.
-    np.testing.assert_allclose(stacked(film, "RGB"), film["A"][..., None] * COLOR, atol=ROUNDING)
+    np.testing.assert_allclose(
+        stacked(framebuffer, "RGB"), framebuffer["A"][..., None] * COLOR, atol=ROUNDING
+    )
 
 
 @pytest.mark.parametrize("step", [0.05, 0.5, 1, 2])
@@ -140,11 +142,11 @@ def test_opacity_does_not_depend_on_the_step(device: Device, folder: Path, step:
     scene = volume_scene(
         camera, folder=folder, file="ramp.nrrd", transfer=transfer, step=step, opacity_limit=1, size=(8, 8)
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     # 48 voxels deep; places lie at 0, step, 2 step ... below 48.
     places = np.ceil(48 / step)
     expected = 1 - 0.95 ** (step * places)
-    np.testing.assert_allclose(film["A"], expected, atol=0.05 * step * 0.95**48 + ROUNDING)
+    np.testing.assert_allclose(framebuffer["A"], expected, atol=0.05 * step * 0.95**48 + ROUNDING)
     assert expected == pytest.approx(1 - 0.95**48, abs=0.01)
 
 
@@ -156,15 +158,15 @@ def test_places_one_by_one(device: Device, folder: Path, name: str, camera: str,
     scene = volume_scene(
         CAMERAS[camera], folder=folder, file=f"{name}.nrrd", transfer=STOPS, interpolation=interpolation
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     nearest = interpolation == "nearest"
     color, opacity = composited(scene, GRIDS[name](), CORNER, [VOXEL] * 3, look_of(STOPS), nearest=nearest)
     # A place at the very middle between two voxels, and a ray at its opacity limit, may go either way.
-    off = np.abs(film["A"] - opacity) > ROUNDING
-    off |= np.abs(stacked(film, "RGB") - color).max(-1) > 10 * ROUNDING
+    off = np.abs(framebuffer["A"] - opacity) > ROUNDING
+    off |= np.abs(stacked(framebuffer, "RGB") - color).max(-1) > 10 * ROUNDING
     assert off.mean() < (0.02 if nearest else 0.004)
-    assert (film["A"] > 0.5).mean() > 0.1
-    assert film["A"].max() <= 1
+    assert (framebuffer["A"] > 0.5).mean() > 0.1
+    assert framebuffer["A"].max() <= 1
 
 
 def test_a_ramp_has_its_values(device: Device, folder: Path) -> None:
@@ -176,7 +178,7 @@ def test_a_ramp_has_its_values(device: Device, folder: Path) -> None:
         transfer={"opacity": [{"at": -1, "opacity": 0.2}]},
         step=1,
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     near, far = to_box(origin, direction, CORNER, np.array(SIDES) * VOXEL)
     # 0.8^4 is the first power below a half: the fourth place, three steps in.
@@ -184,32 +186,34 @@ def test_a_ramp_has_its_values(device: Device, folder: Path) -> None:
     seen = t < far - 1e-5
     assert seen.sum() > 800
     points = origin + t[..., None] * direction
-    np.testing.assert_allclose(points_of(film)[seen], points[seen], atol=1e-5)
+    np.testing.assert_allclose(points_of(framebuffer)[seen], points[seen], atol=1e-5)
     depth = (t[..., None] * direction) @ view_of(scene).axis
-    np.testing.assert_allclose(film["Z"][seen], depth[seen], atol=1e-5)
+    np.testing.assert_allclose(framebuffer["Z"][seen], depth[seen], atol=1e-5)
     inner = np.clip(points, CORNER + VOXEL / 2, CORNER + np.array(SIDES) * VOXEL - VOXEL / 2)
-    np.testing.assert_allclose(film["iterations"][seen], (inner @ [0.2, 0.1, -0.15] + 0.5)[seen], atol=1e-4)
-    np.testing.assert_array_equal(film["samples"], 1)
+    np.testing.assert_allclose(
+        framebuffer["iterations"][seen], (inner @ [0.2, 0.1, -0.15] + 0.5)[seen], atol=1e-4
+    )
+    np.testing.assert_array_equal(framebuffer["samples"], 1)
 
 
 def test_normals_of_fog_are_those_of_its_surface(device: Device, folder: Path) -> None:
     """Where a dense ball stops half of the light, the normal is the ball's, to within some degrees."""
     dense = {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.8}]}
     scene = volume_scene(ORTHOGRAPHIC, folder=folder, file="ball.nrrd", transfer=dense, step=0.25)
-    film = shoot(scene, device)
-    offset = points_of(film) - CENTER
-    found = np.isfinite(film["Z"])
+    framebuffer = shoot(scene, device)
+    offset = points_of(framebuffer) - CENTER
+    found = np.isfinite(framebuffer["Z"])
     clear = found & (to_sphere(*rays(scene)[:2], CENTER, RADIUS)[1] < 0.8 * RADIUS)
     assert clear.sum() > 300
     distance = np.linalg.norm(offset, axis=-1)
     assert (np.abs(distance - RADIUS)[clear] < VOXEL).all()
-    cosine = (normals_of(film) * offset).sum(-1)[clear] / distance[clear]
+    cosine = (normals_of(framebuffer) * offset).sum(-1)[clear] / distance[clear]
     assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 4
     # What stops less than half of the light has no place.
-    faint = (film["A"] > 0) & (film["A"] < 0.49)
+    faint = (framebuffer["A"] > 0) & (framebuffer["A"] < 0.49)
     assert faint.any()
-    assert np.isposinf(film["Z"][faint]).all()
-    assert not points_of(film)[faint].any()
+    assert np.isposinf(framebuffer["Z"][faint]).all()
+    assert not points_of(framebuffer)[faint].any()
 
 
 @pytest.mark.parametrize("side", [1, -1])
@@ -226,14 +230,18 @@ def test_the_far_side_of_fog_faces_the_eye(device: Device, folder: Path, side: i
     light = {"direction": (CENTER - position).tolist(), "shadow": False}
     look = {**FLAT, "material": {**FLAT["material"], "ambient": 0, "diffuse": 1}, "lights": [light]}
     transfer = {"opacity": [{"at": -1, "opacity": 0.1}]}
-    film = shoot(volume_scene(camera, folder=folder, file="ramp.nrrd", transfer=transfer, look=look), device)
+    framebuffer = shoot(
+        volume_scene(camera, folder=folder, file="ramp.nrrd", transfer=transfer, look=look), device
+    )
     # Within the grid: at its faces values go on unchanged, and normals turn.
-    depth = np.array(SIDES) * VOXEL / 2 - np.abs(points_of(film) - CENTER)
-    inner = (depth > 2 * VOXEL).all(-1) & (film["A"] > 0.99)
+    depth = np.array(SIDES) * VOXEL / 2 - np.abs(points_of(framebuffer) - CENTER)
+    inner = (depth > 2 * VOXEL).all(-1) & (framebuffer["A"] > 0.99)
     assert inner.sum() > 100
-    np.testing.assert_allclose(normals_of(film)[inner], side * normal + 0 * points_of(film)[inner], atol=0.02)
+    np.testing.assert_allclose(
+        normals_of(framebuffer)[inner], side * normal + 0 * points_of(framebuffer)[inner], atol=0.02
+    )
     toward = (position - CENTER) / np.linalg.norm(position - CENTER)
-    brightness = stacked(film, "RGB")[inner] / film["A"][inner, None]
+    brightness = stacked(framebuffer, "RGB")[inner] / framebuffer["A"][inner, None]
     np.testing.assert_allclose(np.median(brightness, axis=0), COLOR * side * (normal @ toward), rtol=0.05)
 
 
@@ -252,7 +260,7 @@ def test_fog_outside_of_a_filled_grid(device: Device, camera: str, value: str) -
     scene = volume_scene(
         CAMERAS[camera], value=value, resolution=60, box={"size": 3}, transfer=transfer, opacity_limit=1
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     corner, voxel = np.full(3, -1.5), 0.05
     if value == "inside":
         values = np.linalg.norm(middles((60, 60, 60), corner, [voxel] * 3), axis=-1) < BALL_RADIUS
@@ -264,10 +272,10 @@ def test_fog_outside_of_a_filled_grid(device: Device, camera: str, value: str) -
     color, opacity = composited(scene, values, corner, [voxel] * 3, look_of(transfer))
     assert opacity.min() > 0.3
     # A few voxels at the surface are another's by rounding.
-    off = np.abs(film["A"] - opacity)
+    off = np.abs(framebuffer["A"] - opacity)
     assert np.quantile(off, 0.95) < ROUNDING
     assert off.max() < 0.01
-    np.testing.assert_allclose(stacked(film, "RGB"), color, atol=0.01)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB"), color, atol=0.01)
 
 
 def test_fog_outside_is_lit_as_that_of_a_file(device: Device, tmp_path: Path) -> None:
@@ -308,14 +316,14 @@ def test_fog_outside_is_lit_as_that_of_a_file(device: Device, tmp_path: Path) ->
 def test_the_opacity_limit_ends_rays(device: Device, folder: Path) -> None:
     """At 0.6 no ray goes on that is as opaque; it takes fewer steps, and what it misses is below the limit."""
     dense = {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0.5}]}
-    films = [
+    framebuffers = [
         shoot(
             volume_scene(PERSPECTIVE, folder=folder, file="ball.nrrd", transfer=dense, opacity_limit=limit),
             device,
         )
         for limit in (0.6, 1)
     ]
-    early, late = films
+    early, late = framebuffers
     core = late["A"] > 0.99
     assert core.sum() > 200
     assert (early["A"][core] >= 0.6 - 1e-6).all()
@@ -329,10 +337,10 @@ def test_the_opacity_limit_ends_rays(device: Device, folder: Path) -> None:
 def test_empty_space_is_left_out(device: Device, folder: Path) -> None:
     """Rays past a ball in empty space take few steps, and rays past the grid none; steps are whole numbers."""
     scene = volume_scene(ORTHOGRAPHIC, folder=folder, file="ball.nrrd", transfer=FOG)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     near, far = to_box(origin, direction, CORNER, np.array(SIDES) * VOXEL)
-    steps = film["steps"]
+    steps = framebuffer["steps"]
     assert np.array_equal(steps, np.round(steps))
     assert not steps[near > far].any()
     assert (steps[far - near > VOXEL] >= 1).all()
@@ -353,6 +361,8 @@ def test_an_empty_grid(device: Device, folder: Path, transfer: dict[str, Any]) -
         box = {"center": [5, 5, 5], "size": 2}
         camera = {"position": [1, 1, 1], "target": [5, 5, 5]}
         scene = volume_scene(camera, box=box, resolution=24)
-    film = shoot(scene, device)
-    assert not stacked(film, [name for name in CHANNELS if name not in ("Z", "steps", "samples")]).any()
-    assert np.isposinf(film["Z"]).all()
+    framebuffer = shoot(scene, device)
+    assert not stacked(
+        framebuffer, [name for name in CHANNELS if name not in ("Z", "steps", "samples")]
+    ).any()
+    assert np.isposinf(framebuffer["Z"]).all()

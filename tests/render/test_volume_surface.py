@@ -62,10 +62,10 @@ def test_the_radius_follows_the_level(
     keep(tmp_path / "depth.nrrd", values, corner, [voxel] * 3)
     wanted = None if level is None else float(scale * (level - 1) + zero)
     scene = volume_scene(PERSPECTIVE, folder=tmp_path, file="depth.nrrd", level=wanted)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     low, high = float(values.min()), float(values.max())
     radius = 1 - level if level is not None else (zero - (low + high) / 2) / scale
-    found = np.linalg.norm(points_of(film), axis=-1)[film["A"] == 1]
+    found = np.linalg.norm(points_of(framebuffer), axis=-1)[framebuffer["A"] == 1]
     assert len(found) > 100
     # Between voxels, along a straight line, a distance is met to voxel^2 / (8 radius); rounding moves it by half a value.
     assert np.abs(found - radius).max() < 0.0035 / radius + 0.5 / scale * (dtype != np.float32)
@@ -85,8 +85,8 @@ def test_a_level_of_counts(device: Device, store: str) -> None:
         formula={**BALL, "distance_bailout": 100},
     )
     radius = 100 ** (2.0**-level)
-    film = shoot(scene, device)
-    found = np.linalg.norm(points_of(film), axis=-1)[film["A"] == 1]
+    framebuffer = shoot(scene, device)
+    found = np.linalg.norm(points_of(framebuffer), axis=-1)[framebuffer["A"] == 1]
     assert len(found) > 500
     assert np.abs(found - radius).max() < (0.01 if store == "float" else 0.03)
 
@@ -111,26 +111,26 @@ def test_a_filled_ball(
 ) -> None:
     """Rays hit within a voxel of the ball; depth, point, normal, light and coverage are those of the hit."""
     scene = volume_scene(CAMERAS[camera], box=box, resolution=resolution, look=LOOK, **keys)
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     distance, nearest = to_sphere(origin, direction, (0, 0, 0), BALL_RADIUS)
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     voxel = 0.0625
     assert hit[nearest < BALL_RADIUS - voxel].all()
     assert not hit[nearest > BALL_RADIUS + voxel].any()
-    np.testing.assert_array_equal(film["A"], hit)
-    points = points_of(film)
+    np.testing.assert_array_equal(framebuffer["A"], hit)
+    points = points_of(framebuffer)
     assert np.abs(np.linalg.norm(points, axis=-1) - BALL_RADIUS)[hit].max() < voxel
     # On the pixel's own ray, at its depth.
     t = ((points - origin) * direction).sum(-1)
     assert np.linalg.norm(origin + t[..., None] * direction - points, axis=-1)[hit].max() < 1e-5
     eye = np.array(scene.camera.position)
     depth = (points - eye) @ view_of(scene).axis
-    np.testing.assert_allclose(film["Z"][hit], depth[hit], atol=1e-5)
+    np.testing.assert_allclose(framebuffer["Z"][hit], depth[hit], atol=1e-5)
     clear = hit & (nearest < 0.8 * BALL_RADIUS)
     assert np.abs(t - distance)[clear].max() < voxel / 0.6
     # Normals.
-    normals = normals_of(film)
+    normals = normals_of(framebuffer)
     np.testing.assert_allclose(np.linalg.norm(normals[hit], axis=-1), 1, atol=1e-5)
     cosine = (normals * points).sum(-1)[hit] / np.linalg.norm(points, axis=-1)[hit]
     angle = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
@@ -138,22 +138,22 @@ def test_a_filled_ball(
     assert angle.max() < 2.5 * degrees
     # Light, from the very normals.
     wanted = lit(points, normals, -direction, np.array([0.8, 0.6, 0.4]))
-    np.testing.assert_allclose(stacked(film, "RGB")[hit], wanted[hit], atol=2e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[hit], wanted[hit], atol=2e-4)
     # Nothing where nothing is, but the background.
-    np.testing.assert_array_equal(stacked(film, "RGB")[~hit], 0.5)
-    assert np.isposinf(film["Z"][~hit]).all()
-    assert not stacked(film, [n for n in CHANNELS if n[0] in "NPi"])[~hit].any()
-    assert np.isfinite(stacked(film, [n for n in CHANNELS if n != "Z"])).all()
+    np.testing.assert_array_equal(stacked(framebuffer, "RGB")[~hit], 0.5)
+    assert np.isposinf(framebuffer["Z"][~hit]).all()
+    assert not stacked(framebuffer, [n for n in CHANNELS if n[0] in "NPi"])[~hit].any()
+    assert np.isfinite(stacked(framebuffer, [n for n in CHANNELS if n != "Z"])).all()
 
 
 def test_color_by_normal(device: Device) -> None:
     flat = {**LIT, "material": {"ambient": 0.5, "diffuse": 0, "specular": 0}, "coloring": {"by": "normal"}}
     scene = volume_scene(PERSPECTIVE, box=BOX, resolution=64, value="coverage", look=flat)
-    film = shoot(scene, device)
-    hit = film["A"] == 1
+    framebuffer = shoot(scene, device)
+    hit = framebuffer["A"] == 1
     # Two lights: 0.5 white and 0.5 of a bluish one.
-    wanted = 0.5 * (0.5 * normals_of(film) + 0.5) * (1 + np.array([0.2, 0.4, 0.9]))
-    np.testing.assert_allclose(stacked(film, "RGB")[hit], wanted[hit], atol=1e-5)
+    wanted = 0.5 * (0.5 * normals_of(framebuffer) + 0.5) * (1 + np.array([0.2, 0.4, 0.9]))
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[hit], wanted[hit], atol=1e-5)
     assert hit.sum() > 500
 
 
@@ -172,21 +172,21 @@ def test_the_surface_of_a_given_grid(
     scene = volume_scene(
         PERSPECTIVE, folder=tmp_path, file="a.nrrd", transfer={"color": colors}, normal_radius=0
     )
-    film = shoot(scene, device)
+    framebuffer = shoot(scene, device)
     origin, direction, _ = rays(scene)
     _, nearest = to_sphere(origin, direction, (0, 0, 0), 0.9)
-    hit = film["A"] == 1
+    hit = framebuffer["A"] == 1
     np.testing.assert_array_equal(
         hit[np.abs(nearest - 0.9) > 0.01], nearest[np.abs(nearest - 0.9) > 0.01] < 0.9
     )
     clear = nearest < 0.8
     # A step of half a voxel, halved five times, and the curve between voxels.
-    radius = np.linalg.norm(points_of(film), axis=-1)
+    radius = np.linalg.norm(points_of(framebuffer), axis=-1)
     assert np.abs(radius - 0.9)[hit].max() < 0.004
-    cosine = (normals_of(film) * points_of(film)).sum(-1)[clear] / radius[clear]
+    cosine = (normals_of(framebuffer) * points_of(framebuffer)).sum(-1)[clear] / radius[clear]
     assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 1.5
     # Close to the level, on its inner side.
-    np.testing.assert_allclose(film["iterations"][hit], offset, atol=0.4)
+    np.testing.assert_allclose(framebuffer["iterations"][hit], offset, atol=0.4)
 
 
 def test_a_grid_of_one_layer(device: Device, tmp_path: Path) -> None:
@@ -210,11 +210,11 @@ def test_a_grid_of_one_layer(device: Device, tmp_path: Path) -> None:
             size=(40, 40),
             interpolation="nearest",
         )
-        film = shoot(scene, device)
+        framebuffer = shoot(scene, device)
         wanted = np.zeros((40, 40))
         wanted[10 + 5 : 10 + 15, 5 + 10 : 5 + 25] = 1
         # Rows of the picture run downward, those of the array upward.
-        np.testing.assert_array_equal(film["A"], wanted[::-1])
+        np.testing.assert_array_equal(framebuffer["A"], wanted[::-1])
 
 
 def test_shadow_of_a_ball_on_a_slab(device: Device, tmp_path: Path) -> None:
@@ -233,16 +233,16 @@ def test_shadow_of_a_ball_on_a_slab(device: Device, tmp_path: Path) -> None:
         "background": "transparent",
     }
     camera = {"projection": "orthographic", "position": [0, -3, 6], "target": [0, 0, 0], "height": 3}
-    films = {
+    framebuffers = {
         shadows: shoot(
             volume_scene(camera, folder=tmp_path, file="s.nrrd", look=look, size=(64, 64), shadows=shadows),
             device,
         )
         for shadows in (True, False)
     }
-    film = films[True]
-    points, normals = points_of(film), normals_of(film)
-    slab = (film["A"] == 1) & (np.abs(points[..., 2] + 0.6) < 0.03) & (normals[..., 2] > 0.99)
+    framebuffer = framebuffers[True]
+    points, normals = points_of(framebuffer), normals_of(framebuffer)
+    slab = (framebuffer["A"] == 1) & (np.abs(points[..., 2] + 0.6) < 0.03) & (normals[..., 2] > 0.99)
     slab &= (np.abs(points[..., 0]) < 1.4) & (np.abs(points[..., 1]) < 1.0)
     assert slab.sum() > 700
     unit = toward / np.linalg.norm(toward)
@@ -250,7 +250,7 @@ def test_shadow_of_a_ball_on_a_slab(device: Device, tmp_path: Path) -> None:
     dark, open_ = slab & (nearest < 0.4 - 0.05), slab & (nearest > 0.4 + 0.05)
     assert dark.sum() > 60
     # Ambient of both, diffuse of the second; and the first's diffuse by its slant.
-    np.testing.assert_allclose(film["R"][dark], 0.5 + 0.5, atol=0.01)
-    np.testing.assert_allclose(film["R"][open_], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
-    np.testing.assert_allclose(films[False]["R"][dark], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
-    assert (film["steps"] >= films[False]["steps"]).all()
+    np.testing.assert_allclose(framebuffer["R"][dark], 0.5 + 0.5, atol=0.01)
+    np.testing.assert_allclose(framebuffer["R"][open_], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
+    np.testing.assert_allclose(framebuffers[False]["R"][dark], 0.5 + 0.5 + 0.5 * unit[2], atol=0.01)
+    assert (framebuffer["steps"] >= framebuffers[False]["steps"]).all()

@@ -12,9 +12,9 @@ import numpy as np
 import clfractal
 from clfractal.device.select import Device
 from clfractal.engine.canvas import CHANNELS
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.show import Look
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from clfractal.viewer.display import CopyTarget, Display, Shown
 from clfractal.viewer.frame import Frame
@@ -99,16 +99,16 @@ def planes(frame: Frame) -> list[dict[str, np.ndarray]]:
     return [frame.canvas.read(device.transfers, number) for number in range(len(frame.canvas.parts))]
 
 
-def films_of(frame: Frame) -> JobFilms:
-    """Films that hold what is on a frame's canvas."""
-    films = JobFilms(frame.job)
-    for film, found in zip(films.films, planes(frame), strict=True):
-        film.fill({name: found[name] for name in film})
-    return films
+def framebuffers_of(frame: Frame) -> JobFramebuffers:
+    """Framebuffers that hold what is on a frame's canvas."""
+    framebuffers = JobFramebuffers(frame.job)
+    for framebuffer, found in zip(framebuffers.framebuffers, planes(frame), strict=True):
+        framebuffer.fill({name: found[name] for name in framebuffer})
+    return framebuffers
 
 
-def equal_pictures(first: Film, second: Film) -> None:
-    """Asserts that the colours and depths of two films have the same bits."""
+def equal_pictures(first: Framebuffer, second: Framebuffer) -> None:
+    """Asserts that the colours and depths of two framebuffers have the same bits."""
     for name in CHANNELS:
         if name in first.channels and name in second.channels:
             np.testing.assert_array_equal(first[name].view(np.uint32), second[name].view(np.uint32), name)
@@ -156,7 +156,7 @@ SCENES: dict[str, tuple[str, ...]] = {
 }
 
 
-def shell(scene: Scene) -> clfractal.Film:
+def shell(scene: Scene) -> clfractal.Framebuffer:
     """The shell's picture."""
     return clfractal.render(scene, channels=CHANNELS)
 

@@ -15,7 +15,7 @@ from clfractal.engine.show import Look
 from clfractal.images.outputs import png_bytes
 from clfractal.viewer.display import CopyTarget, Display
 from tests.scenes import STEREO
-from tests.viewer.sessions import BULB, films_of, scene_of, session_on, shown_frame, wait_for
+from tests.viewer.sessions import BULB, framebuffers_of, scene_of, session_on, shown_frame, wait_for
 
 
 @pytest.mark.parametrize("overrides", [(), (STEREO,), ("image.width=77", "output.exposure=1.5")])
@@ -26,7 +26,9 @@ def test_a_frame_arrives_as_files_have_it(overrides: tuple[str, ...], device: De
     with session_on(device) as watch:
         frame = watch.finished(scene)
         shown, pixels = shown_frame(device, watch, frame, Look(scene.output.stops, scene.stereo))
-        wanted = np.asarray(Image.open(io.BytesIO(png_bytes(films_of(frame).picture()))).convert("RGB"))
+        wanted = np.asarray(
+            Image.open(io.BytesIO(png_bytes(framebuffers_of(frame).picture()))).convert("RGB")
+        )
         depths = [frame.canvas.read(device.transfers, n)["Z"] for n in range(len(frame.views))]
     np.testing.assert_array_equal(pixels[..., :3], wanted)
     assert shown.frame is frame

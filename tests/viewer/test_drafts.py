@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device import activity
 from clfractal.device.select import Device
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
@@ -24,7 +24,7 @@ from tests.viewer.panel_harness import make_ui
 from tests.viewer.sessions import (
     BULB,
     equal_pictures,
-    films_of,
+    framebuffers_of,
     scene_of,
     session_on,
     shell,
@@ -83,7 +83,7 @@ def test_it_is_a_draft_while_it_moves_alone(options: tuple[str, ...], device: De
         assert red > 2 * green, "it has its colour"
         frame = watch.rest()
         assert (frame.request, frame.finished, frame.is_draft) == (number, True, False)
-        equal_pictures(films_of(frame).picture(), shell(turned(scene, 0.5)))
+        equal_pictures(framebuffers_of(frame).picture(), shell(turned(scene, 0.5)))
 
 
 def planes_of(planes: dict[str, np.ndarray], name: str) -> float:
@@ -122,13 +122,13 @@ def test_a_draft_takes_a_part_of_the_time(device: Device) -> None:
     times = {}
     for name, shown in (("paths", scene), ("draft", draft(scene))):
         executor, job = LocalExecutor(device), prepare(shown, device, channels=("R", "G", "B", "A", "Z"))
-        times[name] = min(rendered(executor, JobFilms(job.coarse(2))) for _ in range(3))
+        times[name] = min(rendered(executor, JobFramebuffers(job.coarse(2))) for _ in range(3))
     assert times["draft"] < 0.5 * times["paths"]
 
 
-def rendered(executor: LocalExecutor, films: JobFilms) -> float:
+def rendered(executor: LocalExecutor, framebuffers: JobFramebuffers) -> float:
     """Milliseconds of the kernels."""
-    return run(films.job, films.films, executor).kernel_ms
+    return run(framebuffers.job, framebuffers.framebuffers, executor).kernel_ms
 
 
 def test_it_is_told(device: Device) -> None:

@@ -24,7 +24,7 @@ from tests.viewer.sessions import (
     BULB,
     SCENES,
     equal_pictures,
-    films_of,
+    framebuffers_of,
     scene_of,
     session_on,
     shell,
@@ -104,7 +104,7 @@ def test_a_slow_drag_of_a_parameter_shows_pictures(shown: Shown, slow: Slow) -> 
     assert slow.begun == count
     assert power(frame) == values[-1]
     slow.seconds = 0.0
-    equal_pictures(films_of(frame).picture(), shell(shown.studio.shown_scene))
+    equal_pictures(framebuffers_of(frame).picture(), shell(shown.studio.shown_scene))
 
 
 def of_own_text(value: float, *overrides: str) -> Scene:
@@ -154,7 +154,7 @@ def test_the_old_picture_follows_the_camera(shown: Shown, slow: Slow) -> None:
     slow.seconds = 0.0
     frame = shown.rest()
     assert (power(frame), frame.finished) == (6.3, True)
-    equal_pictures(films_of(frame).picture(), shell(shown.studio.shown_scene))
+    equal_pictures(framebuffers_of(frame).picture(), shell(shown.studio.shown_scene))
 
 
 def test_a_grid_is_filled_while_the_old_one_is_seen(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,7 +185,7 @@ def test_a_grid_is_filled_while_the_old_one_is_seen(device: Device, monkeypatch:
         assert len({each.scene.camera.position for each in old}) >= 3
         assert (frame.request, frame.finished, fills[0]) == (number, True, 1)
         monkeypatch.setattr(VolumeKernel, "_fill", fill)
-        equal_pictures(films_of(frame).picture(), shell(turned(zoomed, 0.3)))
+        equal_pictures(framebuffers_of(frame).picture(), shell(turned(zoomed, 0.3)))
 
 
 def test_another_scene_does_not_wait(device: Device, slow: Slow) -> None:
@@ -201,7 +201,7 @@ def test_another_scene_does_not_wait(device: Device, slow: Slow) -> None:
         assert slow.begun - slow.ended == 1
         frame = watch.finished(turned(scene_of(), 0.5))
         assert time.perf_counter() - start < 10
-        equal_pictures(films_of(frame).picture(), shell(turned(scene_of(), 0.5)))
+        equal_pictures(framebuffers_of(frame).picture(), shell(turned(scene_of(), 0.5)))
 
 
 def test_it_closes_and_pauses_while_something_is_prepared(device: Device, slow: Slow) -> None:

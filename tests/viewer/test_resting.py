@@ -12,7 +12,7 @@ from clfractal.device.select import Device
 from clfractal.errors import FileError
 from clfractal.viewer import resting
 from tests.scenes import STEREO
-from tests.viewer.sessions import BULB, films_of, scene_of, session_on, wait_for
+from tests.viewer.sessions import BULB, framebuffers_of, scene_of, session_on, wait_for
 
 PATHS = (
     "lighting={mode: path, bounces: 2}",
@@ -23,8 +23,8 @@ PATHS = (
 CLEAN = "output.denoise=true"
 
 
-def colors(film: Any) -> Any:
-    return np.stack([film[name] for name in "RGB"], -1).astype(float)
+def colors(framebuffer: Any) -> Any:
+    return np.stack([framebuffer[name] for name in "RGB"], -1).astype(float)
 
 
 def error(found: Any, exact: Any) -> float:
@@ -36,9 +36,9 @@ def test_at_rest_the_noise_is_gone(device: Device) -> None:
     noisy, wanted = scene_of(BULB, *PATHS), scene_of(BULB, *PATHS, CLEAN)
     exact = colors(clfractal.render(noisy, samples=128, channels=("R", "G", "B")))
     with session_on(device) as watch:
-        before = colors(films_of(watch.finished(noisy)).films[0])
+        before = colors(framebuffers_of(watch.finished(noisy)).framebuffers[0])
         frame = watch.finished(wanted)
-        after = films_of(frame).films[0]
+        after = framebuffers_of(frame).framebuffers[0]
         frames = watch.frames
     assert error(colors(after), exact) < 0.65 * error(before, exact)
     # About as good as what is saved, which knows more of the surfaces.
@@ -65,9 +65,9 @@ def test_pairs_layouts_and_volumes(device: Device, sections: tuple[str, ...]) ->
     wanted = scene_of(BULB, *PATHS, *sections, CLEAN)
     with session_on(device) as watch:
         frame = watch.finished(wanted)
-        films = films_of(frame).films
+        framebuffers = framebuffers_of(frame).framebuffers
     assert watch.session.problem is None
-    assert all(np.isfinite(colors(film)).all() for film in films)
+    assert all(np.isfinite(colors(framebuffer)).all() for framebuffer in framebuffers)
     assert frame.finished
 
 
@@ -79,11 +79,11 @@ def test_without_the_package_the_picture_stays_as_it_is(
 
     monkeypatch.setattr(resting, "check_installed", missing)
     with session_on(device) as watch:
-        before = colors(films_of(watch.finished(scene_of(BULB, *PATHS))).films[0])
+        before = colors(framebuffers_of(watch.finished(scene_of(BULB, *PATHS))).framebuffers[0])
         watch.session.request(scene_of(BULB, *PATHS, CLEAN))
         frame = watch.rest()
         assert frame.finished
-        after = colors(films_of(frame).films[0])
+        after = colors(framebuffers_of(frame).framebuffers[0])
         assert "pyoidn" in str(watch.session.problem)
     np.testing.assert_array_equal(before, after)
 

@@ -7,7 +7,7 @@ from typing import Any, cast
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.engine.comfort import comfort_of_films
+from clfractal.engine.comfort import comfort_of_framebuffers
 from clfractal.engine.show import Look
 from clfractal.viewer.cables import Cables
 from clfractal.viewer.depth_range import DepthRange
@@ -16,7 +16,7 @@ from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.room import Room
 from clfractal.viewer.window import Monitor
 from tests.viewer.panel_harness import make_ui
-from tests.viewer.sessions import BULB, films_of, scene_of, session_on, shown_frame
+from tests.viewer.sessions import BULB, framebuffers_of, scene_of, session_on, shown_frame
 
 # Room for panels
 
@@ -133,4 +133,4 @@ def test_the_depth_of_the_picture_is_that_of_a_file(device: Device, convergence:
             shown, _ = shown_frame(device, watch, frame, Look(0.0, scene.stereo))
             warning = minded.look(shown)
             assert bool(warning) == bool(wanted)
-            assert minded.comfort == comfort_of_films(frame.job, films_of(frame).films)
+            assert minded.comfort == comfort_of_framebuffers(frame.job, framebuffers_of(frame).framebuffers)

@@ -13,7 +13,7 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.engine.canvas import CHANNELS
-from clfractal.engine.job_films import JobFilms
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare as prepared
 from clfractal.engine.run import run
@@ -30,7 +30,7 @@ from tests.viewer.sessions import (
     SCENES,
     Watch,
     equal_pictures,
-    films_of,
+    framebuffers_of,
     planes,
     scene_of,
     session_on,
@@ -45,15 +45,15 @@ def test_the_picture_at_rest_has_the_bits_of_the_shell(name: str, device: Device
     scene = scene_of(BULB, *SCENES[name])
     with session_on(device) as watch:
         frame = watch.finished(scene)
-        films = films_of(frame)
+        framebuffers = framebuffers_of(frame)
     assert frame.samples == frame.job.samples
     if frame.job.stays_apart:
-        for side, film in zip(
+        for side, framebuffer in zip(
             ("left", "right"), clfractal.render_pair(scene, channels=CHANNELS), strict=True
         ):
-            equal_pictures(films.eyes()[side], film)  # type: ignore[index]
+            equal_pictures(framebuffers.eyes()[side], framebuffer)  # type: ignore[index]
     else:
-        equal_pictures(films.picture(), shell(scene))
+        equal_pictures(framebuffers.picture(), shell(scene))
 
 
 def test_frames_become_finer(device: Device) -> None:
@@ -91,7 +91,7 @@ def test_while_something_moves_frames_come_whatever_the_rate_of_requests(device:
         assert len({each.request for each in moving}) >= 3
         assert all(each.samples == 1 for each in moving)
         assert (frame.request, frame.finished) == (last, True)
-        equal_pictures(films_of(frame).picture(), shell(turned(scene, 0.0001 * number)))
+        equal_pictures(framebuffers_of(frame).picture(), shell(turned(scene, 0.0001 * number)))
 
 
 def test_a_request_ends_what_is_under_way(device: Device) -> None:
@@ -107,7 +107,7 @@ def test_a_request_ends_what_is_under_way(device: Device) -> None:
             wait_for(lambda: watch.frames[-1].request == number)  # noqa: B023
             assert time.perf_counter() - start < 2
         frame = watch.rest()
-        equal_pictures(films_of(frame).picture(), shell(scene_of()))
+        equal_pictures(framebuffers_of(frame).picture(), shell(scene_of()))
 
 
 def test_requests_at_random_moments(device: Device) -> None:
@@ -131,7 +131,7 @@ def test_requests_at_random_moments(device: Device) -> None:
             time.sleep(random.random() ** 2 * 0.1)
         for scene in scenes:
             frame = watch.finished(scene)
-            equal_pictures(films_of(frame).picture(), shell(scene))
+            equal_pictures(framebuffers_of(frame).picture(), shell(scene))
 
 
 @pytest.mark.parametrize("name", ["mandelbulb", "adaptive", "float64", "volume", "cut plane", "layout"])
@@ -147,7 +147,7 @@ def test_pausing_keeps_the_bits(name: str, device: Device) -> None:
             watch.session.pause(False)
         frame = watch.rest()
         assert frame.finished
-        equal_pictures(films_of(frame).picture(), shell(scene))
+        equal_pictures(framebuffers_of(frame).picture(), shell(scene))
 
 
 def test_a_request_that_is_paused_before_its_first_frame_goes_on(device: Device) -> None:
@@ -174,7 +174,7 @@ def test_a_region_is_refined_alone(device: Device) -> None:
         one = first_look(scene, device)
         watch.finished(turned(scene, 0.8))
         frame = watch.finished(scene, region=region)
-        found = films_of(frame).picture()
+        found = framebuffers_of(frame).picture()
     whole = shell(scene)
     x, y, width, height = region
     inside = np.zeros((64, 96), bool)
@@ -187,22 +187,22 @@ def test_a_region_is_refined_alone(device: Device) -> None:
     assert (found["R"][~inside] != whole["R"][~inside]).any()
 
 
-def first_look(scene: Scene, device: Device) -> clfractal.Film:
+def first_look(scene: Scene, device: Device) -> clfractal.Framebuffer:
     """A ray for each pixel, through its middle; its light is smoothed as that of the finished picture."""
     job = prepared(scene, device, channels=CHANNELS)
-    films = JobFilms(replace(job, views=tuple(view.coarse(1) for view in job.views)))
-    run(films.job, films.films, LocalExecutor(device))
-    return films.picture()
+    framebuffers = JobFramebuffers(replace(job, views=tuple(view.coarse(1) for view in job.views)))
+    run(framebuffers.job, framebuffers.framebuffers, LocalExecutor(device))
+    return framebuffers.picture()
 
 
 def test_a_region_of_a_picture_that_is_there_leaves_the_rest(device: Device) -> None:
     scene = scene_of()
     with session_on(device) as watch:
-        before = films_of(watch.finished(scene)).picture()
+        before = framebuffers_of(watch.finished(scene)).picture()
         watch.frames.clear()
         frame = watch.finished(scene, region=(5, 6, 20, 20))
         assert all(each.divider == 1 for each in watch.frames)
-        equal_pictures(films_of(frame).picture(), before)
+        equal_pictures(framebuffers_of(frame).picture(), before)
 
 
 @pytest.mark.parametrize("name", ["adaptive", "volume", "layout"])
@@ -218,7 +218,7 @@ def test_samples_that_were_lost_are_made_again(name: str, device: Device) -> Non
             watch.session._executor._drawings.clear()
         assert not frame.finished
         watch.session.pause(False)
-        equal_pictures(films_of(watch.rest()).picture(), shell(scene))
+        equal_pictures(framebuffers_of(watch.rest()).picture(), shell(scene))
 
 
 @pytest.mark.parametrize("name", ["layout", "squeezed", "anaglyph", "layout and stereo"])
@@ -261,7 +261,7 @@ def test_a_scene_that_does_not_compile_leaves_the_picture(
         assert watch.session.frame is before
         assert text in str(watch.session.problem)
         after = watch.finished(scene_of(BULB, "renderer.samples=3"))
-        equal_pictures(films_of(after).picture(), shell(scene_of(BULB, "renderer.samples=3")))
+        equal_pictures(framebuffers_of(after).picture(), shell(scene_of(BULB, "renderer.samples=3")))
 
 
 @pytest.mark.parametrize("error", [DeviceError("lost"), RuntimeError("a mistake")])
@@ -307,7 +307,7 @@ def test_without_room_for_passes_all_samples_are_made_at_once(
     monkeypatch.setattr(Drawing, "keep", small)
     with session_on(device) as watch:
         frame = watch.finished(scene_of())
-        equal_pictures(films_of(frame).picture(), shell(scene_of()))
+        equal_pictures(framebuffers_of(frame).picture(), shell(scene_of()))
     assert any("one pass" in line for line in watch.progress)
 
 
@@ -376,7 +376,7 @@ def test_a_fit_is_carried_along_while_it_moves(device: Device) -> None:
         watch.session.request(moved, moving=True)
         frame = watch.rest()
         # Before other frames reuse its canvas.
-        equal_pictures(films_of(frame).picture(), shell(moved))
+        equal_pictures(framebuffers_of(frame).picture(), shell(moved))
         first = watch.frames[0].job.scene.stereo
         at_rest = frame.job.scene.stereo
         assert first is not None

@@ -25,7 +25,7 @@ from tests.viewer.sessions import (
     BULB,
     SCENES,
     equal_pictures,
-    films_of,
+    framebuffers_of,
     scene_of,
     session_on,
     shell,
@@ -51,7 +51,7 @@ def test_thumbnails_and_stills_come_in_between(device: Device, tmp_path: Path) -
         frame = watch.rest()
         wait_for(lambda: all(each.finished for each in tasks))
         assert frame.finished
-        equal_pictures(films_of(frame).picture(), shell(scene))
+        equal_pictures(framebuffers_of(frame).picture(), shell(scene))
     for thumb in thumbs:
         assert thumb.problem == ""
         assert thumb.pixels is not None

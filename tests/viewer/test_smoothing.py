@@ -14,7 +14,16 @@ from clfractal.viewer.frame import Frame
 from clfractal.viewer.gathering import Gathering
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import Wanted
-from tests.viewer.sessions import BALL, BULB, films_of, planes, scene_of, session_on, shown_frame, wait_for
+from tests.viewer.sessions import (
+    BALL,
+    BULB,
+    framebuffers_of,
+    planes,
+    scene_of,
+    session_on,
+    shown_frame,
+    wait_for,
+)
 
 # The second view has fewer samples, and is finished before the first.
 UNEQUAL = "layout={columns: 2, gap: 3, views: [{}, {renderer: {type: cut_plane, samples: 1}}]}"
@@ -88,8 +97,8 @@ def test_beside_a_part_that_is_refined_the_picture_stays(device: Device) -> None
     assert work.growth().smoothing == (0.0,)
     scene = scene_of(BULB, "renderer.samples=8")
     with session_on(device, Pacing(coarsest=1)) as watch:
-        before = films_of(watch.finished(scene)).picture()["R"]
+        before = framebuffers_of(watch.finished(scene)).picture()["R"]
         watch.frames.clear()
         after = watch.finished(scene, region=(10, 10, 30, 20))
         assert {each.smoothing for each in watch.frames} == {(0.0,)}
-        np.testing.assert_array_equal(films_of(after).picture()["R"][40:], before[40:])
+        np.testing.assert_array_equal(framebuffers_of(after).picture()["R"][40:], before[40:])

@@ -17,7 +17,7 @@ from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
 from tests.pictures import read_picture
 from tests.scenes import STEREO
-from tests.viewer.sessions import BALL, BULB, equal_pictures, films_of, scene_of, wait_for
+from tests.viewer.sessions import BALL, BULB, equal_pictures, framebuffers_of, scene_of, wait_for
 
 VIEW = (96, 64)
 
@@ -42,7 +42,7 @@ def converged(studio: Studio) -> None:
     frame = studio.frame
     assert frame is not None
     assert frame.finished
-    films, scene = films_of(frame), studio.shown_scene
+    films, scene = framebuffers_of(frame), studio.shown_scene
     if scene.stereo is None:
         equal_pictures(films.picture(), clfractal.render(scene, channels=CHANNELS))
     else:
@@ -294,7 +294,7 @@ def test_a_frame_at_rest_has_the_films_blur_and_exposure(case: str, device: Devi
         frame = studio.frame
         assert frame is not None
         ((_, film),) = clfractal.frames(scene, numbers=[12], channels=CHANNELS)
-        equal_pictures(films_of(frame).picture(), film)
+        equal_pictures(framebuffers_of(frame).picture(), film)
         assert studio.exposure == film.header["exposure"]
         assert frame.job.views[0].shutter is not None
         coarse = [each for each in shown if each.divider > 1]

@@ -229,7 +229,7 @@ def test_pictures_of_nothing_give_way_to_spares() -> None:
             return False
 
     for task in tasks[:2]:
-        task.film = Dark()
+        task.framebuffer = Dark()
         task.pixels = np.zeros((148, 264, 4), np.uint8)
     settled(ui, stage)
     assert shown(state) == [*range(2, COUNT), COUNT, COUNT + 1]
@@ -237,7 +237,7 @@ def test_pictures_of_nothing_give_way_to_spares() -> None:
     for _ in range(20):
         for task in tasks:
             if task.pixels is None:
-                task.film, task.pixels = Dark(), np.zeros((148, 264, 4), np.uint8)
+                task.framebuffer, task.pixels = Dark(), np.zeros((148, 264, 4), np.uint8)
         stage.frame()
     assert len(shown(state)) == COUNT
     assert len(state.dull) == SPARES

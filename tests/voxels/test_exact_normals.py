@@ -27,12 +27,14 @@ def device() -> Device:
 
 def seen(scene: Scene, device: Device, **settings: Any) -> tuple[Floats, Floats]:
     """Places of hits where the formula is evaluated, and the normals there, length 1."""
-    film = shoot(scene, device, **settings)
-    there = np.isfinite(film["Z"]) & (film["A"] > 0.999)
+    framebuffer = shoot(scene, device, **settings)
+    there = np.isfinite(framebuffer["Z"]) & (framebuffer["A"] > 0.999)
     assert there.sum() > 60
     zoom, origin = zoom_of(scene)
-    normals = normals_of(film)[there]
-    return points_of(film)[there] * zoom + origin, normals / np.linalg.norm(normals, axis=-1, keepdims=True)
+    normals = normals_of(framebuffer)[there]
+    return points_of(framebuffer)[there] * zoom + origin, normals / np.linalg.norm(
+        normals, axis=-1, keepdims=True
+    )
 
 
 def off(scene: Scene, places: Floats, normals: Floats, voxel: float, least: float = 0.95) -> Floats:

@@ -242,11 +242,11 @@ def _card(ui: Ui, state: Choice, work: Draw, number: int, width: float) -> None:
     variation, small = work.found[number]
     key = ("variation", state.number, number)
     picture = ui.studio.thumbnail(key, lambda: small, SIZE, SAMPLES)
-    if picture.film is not None:
-        if len(work.found) - len(state.dull) > COUNT and not worthwhile(picture.film):
+    if picture.framebuffer is not None:
+        if len(work.found) - len(state.dull) > COUNT and not worthwhile(picture.framebuffer):
             state.dull.add(number)
             ui.memory["awaited"] = True
-        picture.film = None
+        picture.framebuffer = None
     card = cards.Card(key, picture.pixels, picture.problem, chosen=_number_of(ui, state) == number)
     imgui.push_id(f"{state.number}")
     clicked = cards.draw(ui, f"{number}", card, width)

@@ -1,7 +1,7 @@
 // Entry points: the points of a pixel, where it has several. They know no formula.
 #include "integrators/stages.h"
 #include "integrators/march/normals.h"
-#include "integrators/spot_found.h"
+#include "integrators/interaction_found.h"
 #include "integrators/march/pixel_points.h"
 
 // Sends the rays of a pixel's points, from where its cone touched.
@@ -21,7 +21,7 @@ STAGE(send_points) {
     points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
 }
 
-// Makes spots of what a pixel's points have met, in the place of `find_spots`.
+// Makes interactions of what a pixel's points have met, in the place of `find_interactions`.
 STAGE(join_points) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
@@ -41,5 +41,5 @@ STAGE(join_points) {
         points_add(s, &points, turn, each, met, object, place, w);
     }
     at_first.coverage = points.count * (R(1.0) / (real)((scalar)settings->point_count));
-    spot_found(s, r, a.wanted, points_spot(s, &points, w), at_first, cost, next_turns, w);
+    interaction_found(s, r, a.wanted, points_interaction(s, &points, w), at_first, cost, next_turns, w);
 }

@@ -1,5 +1,5 @@
 // The points of a pixel (Englund 2010, sec. 3.2.3): they share one march up to where the pixel's cone first touches the set;
-// from there each finds the surface on its own ray. What they find becomes one spot: its normals, colour and coverage.
+// from there each finds the surface on its own ray. What they find becomes one interaction: its normals, colour and coverage.
 //
 // Where positions matter (`geometric`: all normals but the gradient, and the residual) they are kept relative to a point
 // of the pixel's ray, in the pixel's frame: x right, y up, z to the viewer.
@@ -84,7 +84,7 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, ray_hit met, r
     p->other = pick(nearer, met.other, p->other);
     p->share = pick(nearer, met.part, p->share);
     if (is_colored_at_once(w.material)) {
-        const color tint = spot_color(met.normal, met.smooth, object, met.other, met.part, w);
+        const color tint = interaction_color(met.normal, met.smooth, object, met.other, met.part, w);
         p->tint = color_pick(found, color_add(p->tint, tint), p->tint);
     }
     if (w.settings->geometric) points_place(p, number, w.settings->point_rows, found, base);
@@ -113,15 +113,15 @@ INLINE void points_triangles(stage s, const pixel_points *p, vec instead) {
     }
 }
 
-// The spot that stands for the pixel. Where points are missing or lie on a line the normal is made from what is left: by least
+// The interaction that stands for the pixel. Where points are missing or lie on a line the normal is made from what is left: by least
 // squares, or else that of the middle one.
-INLINE spot points_spot(stage s, const pixel_points *p, world w) {
+INLINE interaction points_interaction(stage s, const pixel_points *p, world w) {
     const real share = R(1.0) / fmax(p->count, R(1.0));
-    spot here = {.found = number_of(less(R(0.0), p->count)), .point = p->base, .seen = p->point, .normal = p->normal,
+    interaction here = {.found = number_of(less(R(0.0), p->count)), .point = p->base, .seen = p->point, .normal = p->normal,
                  .smooth = p->smooth, .object = p->object, .other = p->other, .share = p->share, .cone = p->cone,
                  .tint = color_scale(p->tint, share), .residual = R(0.0), .quantity = R(0.0)};
     // (Of the set it is found later; that of a cut object's face only here.)
-    if (!is_colored_at_once(w.material)) here.tint = spot_color(p->normal, p->smooth, p->object, p->other, p->share, w);
+    if (!is_colored_at_once(w.material)) here.tint = interaction_color(p->normal, p->smooth, p->object, p->other, p->share, w);
     mask usable = less(R(1.0), R(0.0));
     if (w.settings->geometric) {
         real residual;

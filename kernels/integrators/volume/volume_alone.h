@@ -19,5 +19,5 @@ INLINE quads quads_ahead(ray r, mask wanted, world w) { return (quads){0}; }
 // Adds those that are left before distance `until`, one after the other.
 INLINE void sight_quads(sight *s, real until, mask active, quads *q, world w) {}
 
-// Puts them into a shot at a surface.
-INLINE shot quads_over(shot s, ray r, const sight *e, color background, real time, mask wanted, world w) { return s; }
+// Puts them into a sample at a surface.
+INLINE pixel_sample quads_over(pixel_sample s, ray r, const sight *e, color background, real time, mask wanted, world w) { return s; }

@@ -55,7 +55,7 @@ INLINE void sight_quads(sight *s, real until, mask active, quads *q, world w) {
     }
 }
 
-INLINE shot quads_over(shot s, ray r, const sight *e, color background, real time, mask wanted, world w) {
+INLINE pixel_sample quads_over(pixel_sample s, ray r, const sight *e, color background, real time, mask wanted, world w) {
     if (w.planes.count == 0) return s;
     const real distance = pick(s.hit, e->t, (real)(REAL_LARGEST));
     return planes_into(s, e->light, background, planes_seen(r, distance, R(-1.0), wanted, w.planes), time, w.view);

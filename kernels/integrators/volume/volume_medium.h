@@ -1,5 +1,5 @@
 // Media in a grid: places are composited from front to back, until the ray is opaque.
-#include "integrators/volume/volume_shot.h"
+#include "integrators/volume/volume_sample.h"
 
 INLINE real part_through(real value, world w) { return R(1.0) - opacity_of(value, w); }
 
@@ -79,9 +79,9 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, cons
     sight_quads(e, (real)(REAL_LARGEST), wanted, &q, w);
 }
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
+INLINE pixel_sample take_sample(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
     sight e;
-    return take_shot(r, at->y + below, time, active, w, &e, &cost->steps);
+    return volume_sample(r, at->y + below, time, active, w, &e, &cost->steps);
 }

@@ -1,4 +1,4 @@
-// Paths through a medium: at each place where light is scattered one light is asked for, and one direction followed (Kajiya 1986), both
+// Paths through a medium: at each place where light is scattered one light is sampled, and one direction followed (Kajiya 1986), both
 // weighed as at surfaces. The colour of the transfer function is the part that is scattered, not absorbed.
 #include "shading/phase.h"
 #include "integrators/roulette.h"
@@ -33,26 +33,26 @@ INLINE void volume_path_adds(volume_path *p, color light, int bounce, mask here,
     p->seen = color_pick(here, color_add(p->seen, more), p->seen);
 }
 
-// Asks one light, and goes on.
+// Samples one light, and goes on.
 INLINE void volume_path_scatters(volume_path *p, const packet_pixels *at, int sample, int bounce, mask here, stream *random, world w, real *looked) {
     real u, v, choice, roulette;
-    volume_path_square(at, sample, PURPOSE_ASK, bounce, w, &u, &v);
+    volume_path_square(at, sample, PURPOSE_SHADOW_RAY, bounce, w, &u, &v);
     volume_path_square(at, sample, PURPOSE_CHOICE, bounce, w, &choice, &roulette);
     p->total = weight_of_all(p->origin, R(0.0), w);
-    const real numbers[ASKING_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
+    const real numbers[LIGHT_SAMPLE_NUMBERS] = {u, v, choice, R(0.5), R(0.5)};
     const medium_event e = {p->direction, (real)(w.settings->anisotropy)};
-    const asked a = light_asked(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
+    const sampled_light a = sample_one_light(p->origin, p->origin, vec_of(R(0.0), R(0.0), R(0.0)), R(0.0), numbers, p->total, w);
     color value;
     real density;
     medium_value(&e, a.ray.toward, &value, &density);
-    const color brings = asked_brings(&a, value, density);
-    const mask asks = here & less(R(0.0), brightest(brings));
+    const color brings = sampled_light_brings(&a, value, density);
+    const mask sampled = here & less(R(0.0), brightest(brings));
     grid_ray to_light;
     real far;
-    const mask crosses = asks & ~a.unblocked & into_grid(p->origin, a.ray.toward, a.ray.distance, w, &to_light, &far);
+    const mask crosses = sampled & ~a.unblocked & into_grid(p->origin, a.ray.toward, a.ray.distance, w, &to_light, &far);
     real comes = R(1.0);
     if (any_lane(crosses)) comes = track_through(to_light, far, crosses, random, w, looked);
-    volume_path_adds(p, color_scale(brings, comes), bounce, asks, w);
+    volume_path_adds(p, color_scale(brings, comes), bounce, sampled, w);
     volume_path_square(at, sample, PURPOSE_SCATTER, bounce, w, &u, &v);
     const onward next = medium_sample(&e, u, v);
     p->density = next.density;
@@ -73,11 +73,11 @@ INLINE first_met follow_path(volume_path *p, const packet_pixels *at, real pictu
     first_met first = {p->on_path & ~p->on_path, vec_of(R(0.0), R(0.0), R(0.0)), vec_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     for (int bounce = 0; bounce <= w.settings->bounces + 1; ++bounce) {
         if (!any_lane(p->on_path)) break;
-        real lamp_far = (real)(REAL_LARGEST), far, number, value;
-        lamp before = lamp_met(p->origin, p->direction, bounce == 0, &lamp_far, w);
+        real light_far = (real)(REAL_LARGEST), far, number, value;
+        light_hit before = light_hit_of(p->origin, p->direction, bounce == 0, &light_far, w);
         before.met &= p->on_path;
         grid_ray g;
-        const mask crosses = p->on_path & into_grid(p->origin, p->direction, lamp_far, w, &g, &far);
+        const mask crosses = p->on_path & into_grid(p->origin, p->direction, light_far, w, &g, &far);
         color shines = color_of(R(0.0), R(0.0), R(0.0));
         const mask met = track(g, far, crosses, &random, w, &number, &value, &shines, looked);
         if (w.settings->shines) volume_path_adds(p, shines, bounce, crosses, w);
@@ -87,7 +87,7 @@ INLINE first_met follow_path(volume_path *p, const packet_pixels *at, real pictu
         } else {
             volume_path_adds(p, before.shows, bounce, ends & before.met, w);
             first.found = met | (before.met & ends);
-            first.point = vec_along(p->origin, pick(met, distance_of(g, number, w), lamp_far), p->direction);
+            first.point = vec_along(p->origin, pick(met, distance_of(g, number, w), light_far), p->direction);
             first.value = pick(met, value, R(0.0));
         }
         p->on_path = met;
@@ -109,12 +109,12 @@ INLINE first_met follow_path(volume_path *p, const packet_pixels *at, real pictu
     return first;
 }
 
-INLINE shot take_path(const packet_pixels *at, ray r, real y, real time, int sample, mask wanted, world w, real *steps) {
+INLINE pixel_sample take_path(const packet_pixels *at, ray r, real y, real time, int sample, mask wanted, world w, real *steps) {
     const color none = color_of(R(0.0), R(0.0), R(0.0));
     volume_path p = {r.origin, r.direction, color_of(R(1.0), R(1.0), R(1.0)), none, R(-1.0), R(1.0), wanted};
     real looked = R(0.0);
     const first_met first = follow_path(&p, at, y, sample, w, &looked);
-    shot s;
+    pixel_sample s;
     s.coverage = pick(first.found, R(1.0), R(0.0));
     s.hit = first.found;
     s.radiance = color_add(p.seen, color_pick(first.found, none, sky(r.direction, y, 0, w)));

@@ -1,5 +1,5 @@
 // Surfaces in a grid: the boundary where the value passes `level`.
-#include "integrators/volume/volume_shot.h"
+#include "integrators/volume/volume_sample.h"
 
 INLINE real part_through(real value, world w) { return pick(less((real)(w.settings->level), value), R(0.0), R(1.0)); }
 
@@ -54,10 +54,10 @@ INLINE void sight_grid(sight *e, ray r, grid_ray g, mask active, mask bare, cons
     sight_add(e, light, R(1.0), t, value, normal, found & ~found, found);
 }
 
-INLINE shot sample_shot(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
+INLINE pixel_sample take_sample(const packet_pixels *at, real across, real below, int sample, mask active, world w, counters *cost) {
     real time;
     const ray r = sample_ray(at, across, below, sample, w, &time);
     sight e;
-    const shot s = take_shot(r, at->y + below, time, active, w, &e, &cost->steps);
+    const pixel_sample s = volume_sample(r, at->y + below, time, active, w, &e, &cost->steps);
     return quads_over(s, r, &e, background_of(at->y + below, w), time, active, w);
 }

@@ -1,4 +1,4 @@
-"""The film in memory: tiles in, channels and pictures out."""
+"""The framebuffer in memory: tiles in, channels and pictures out."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from PIL import Image
 from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.srgb import encode8
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiles import Region
 
 ALL = tuple(CHANNELS)
 
 
-def pattern(film: Film) -> np.ndarray:
+def pattern(framebuffer: Framebuffer) -> np.ndarray:
     """A different number in every pixel of every channel, shape (channels, height, width)."""
-    region = film.region
+    region = framebuffer.region
     y, x = np.mgrid[region.y : region.bottom, region.x : region.right]
-    planes = [(x + 1000.0 * y + 0.25 * index) / 3e5 for index in range(len(film.channels))]
+    planes = [(x + 1000.0 * y + 0.25 * index) / 3e5 for index in range(len(framebuffer.channels))]
     return np.array(planes, dtype=np.float32)
 
 
-def fill(film: Film) -> np.ndarray:
-    wanted = pattern(film)
-    for index in film.grid.order_from_center().tolist():
-        tile = film.grid.tile(index)
-        top, left = tile.y - film.region.y, tile.x - film.region.x
-        film.put(index, wanted[:, top : top + tile.height, left : left + tile.width])
+def fill(framebuffer: Framebuffer) -> np.ndarray:
+    wanted = pattern(framebuffer)
+    for index in framebuffer.grid.order_from_center().tolist():
+        tile = framebuffer.grid.tile(index)
+        top, left = tile.y - framebuffer.region.y, tile.x - framebuffer.region.x
+        framebuffer.put(index, wanted[:, top : top + tile.height, left : left + tile.width])
     return wanted
 
 
@@ -70,87 +70,87 @@ def test_wrong_channel_names() -> None:
     with pytest.raises(SceneError, match="at least one channel"):
         check_channels([])
     with pytest.raises(SceneError, match="unknown channel 'Q'"):
-        Film(["Q"], (4, 4))
+        Framebuffer(["Q"], (4, 4))
 
 
 def test_an_empty_film_holds_the_fill_values() -> None:
-    film = Film(ALL, (5, 3))
+    framebuffer = Framebuffer(ALL, (5, 3))
     for name in ALL:
-        assert film[name].shape == (3, 5)
-        assert film[name].dtype == np.float32
-        assert (film[name] == (np.inf if name == "Z" else 0)).all()
-    assert not film.done.any()
+        assert framebuffer[name].shape == (3, 5)
+        assert framebuffer[name].dtype == np.float32
+        assert (framebuffer[name] == (np.inf if name == "Z" else 0)).all()
+    assert not framebuffer.done.any()
 
 
 @pytest.mark.parametrize("region", [None, Region(0, 0, 1, 1), Region(31, 33, 70, 40), Region(64, 64, 32, 32)])
 def test_tiles_become_channels(region: Region | None) -> None:
-    film = Film(("R", "Z", "steps"), (150, 100), region)
-    wanted = fill(film)
-    assert film.done.all()
-    for plane, name in zip(wanted, film, strict=True):
-        assert np.array_equal(film[name], plane)
+    framebuffer = Framebuffer(("R", "Z", "steps"), (150, 100), region)
+    wanted = fill(framebuffer)
+    assert framebuffer.done.all()
+    for plane, name in zip(wanted, framebuffer, strict=True):
+        assert np.array_equal(framebuffer[name], plane)
 
 
 def test_a_tile_of_the_wrong_shape_is_a_mistake() -> None:
-    film = Film(("R", "Z"), (40, 40))
+    framebuffer = Framebuffer(("R", "Z"), (40, 40))
     for wrong in ((2, 32, 32), (1, 8, 8), (2, 8, 9)):
         with pytest.raises(ValueError, match="shape"):
-            film.put(3, np.zeros(wrong, np.float32))
+            framebuffer.put(3, np.zeros(wrong, np.float32))
     with pytest.raises(IndexError):
-        film.put(4, np.zeros((2, 8, 8), np.float32))
-    film.put(3, np.zeros((2, 8, 8), np.float32))
-    assert film.done.tolist() == [False, False, False, True]
+        framebuffer.put(4, np.zeros((2, 8, 8), np.float32))
+    framebuffer.put(3, np.zeros((2, 8, 8), np.float32))
+    assert framebuffer.done.tolist() == [False, False, False, True]
 
 
 def test_bands_are_rows_of_tiles() -> None:
-    film = Film(("R", "Z"), (150, 100), Region(10, 20, 90, 70))
-    wanted = fill(film)
-    bands = list(film.bands())
+    framebuffer = Framebuffer(("R", "Z"), (150, 100), Region(10, 20, 90, 70))
+    wanted = fill(framebuffer)
+    bands = list(framebuffer.bands())
     assert [(first, len(band["R"])) for first, band in bands] == [(20, 12), (32, 32), (64, 26)]
-    for plane, name in zip(wanted, film, strict=True):
+    for plane, name in zip(wanted, framebuffer, strict=True):
         assert np.array_equal(np.concatenate([band[name] for _, band in bands]), plane)
 
 
 def test_a_region_outside_the_picture_is_a_mistake() -> None:
     with pytest.raises(ValueError, match="not inside"):
-        Film(("R",), (40, 40), Region(10, 10, 31, 5))
+        Framebuffer(("R",), (40, 40), Region(10, 10, 31, 5))
 
 
 def test_an_unknown_channel_of_a_film() -> None:
-    film = Film(("R", "Z"), (4, 4))
-    assert "Z" in film
-    assert "G" not in film
+    framebuffer = Framebuffer(("R", "Z"), (4, 4))
+    assert "Z" in framebuffer
+    assert "G" not in framebuffer
     with pytest.raises(KeyError, match="unknown channel 'G'"):
-        film["G"]
+        framebuffer["G"]
 
 
 def test_rgb8_is_what_a_png_shows() -> None:
-    film = Film(("R", "G", "B", "A"), (70, 50), Region(3, 5, 60, 40))
-    wanted = fill(film)
+    framebuffer = Framebuffer(("R", "G", "B", "A"), (70, 50), Region(3, 5, 60, 40))
+    wanted = fill(framebuffer)
     colors = wanted[:3].transpose(1, 2, 0)
-    assert np.array_equal(film.to_rgb8(), encode8(colors, origin=(3, 5)))
-    assert np.array_equal(film.to_rgb8(exposure=-1), encode8(colors * np.float32(0.5), origin=(3, 5)))
+    assert np.array_equal(framebuffer.to_rgb8(), encode8(colors, origin=(3, 5)))
+    assert np.array_equal(framebuffer.to_rgb8(exposure=-1), encode8(colors * np.float32(0.5), origin=(3, 5)))
     with pytest.raises(KeyError):
-        Film(("Z",), (4, 4)).to_rgb8()
+        Framebuffer(("Z",), (4, 4)).to_rgb8()
 
 
 def test_notebooks_show_a_picture() -> None:
-    film = Film(("R", "G", "B", "A"), (70, 50), header={"scene": "version: 1\n"})
-    fill(film)
-    shown = film._repr_png_()
+    framebuffer = Framebuffer(("R", "G", "B", "A"), (70, 50), header={"scene": "version: 1\n"})
+    fill(framebuffer)
+    shown = framebuffer._repr_png_()
     assert shown is not None
     with Image.open(io.BytesIO(shown)) as image:
-        assert np.array_equal(np.asarray(image), film.to_rgb8())
-    film.header["transparent"] = True
-    shown = film._repr_png_()
+        assert np.array_equal(np.asarray(image), framebuffer.to_rgb8())
+    framebuffer.header["transparent"] = True
+    shown = framebuffer._repr_png_()
     assert shown is not None
     with Image.open(io.BytesIO(shown)) as image:
         assert image.mode == "RGBA"
-    assert Film(("Z",), (4, 4))._repr_png_() is None
+    assert Framebuffer(("Z",), (4, 4))._repr_png_() is None
 
 
 def test_repr_tells_size_and_progress() -> None:
-    film = Film(("R", "Z"), (40, 40))
-    assert repr(film) == "<Film 40x40, channels R Z, 0% done>"
-    film.put(3, np.zeros((2, 8, 8), np.float32))
-    assert repr(film) == "<Film 40x40, channels R Z, 25% done>"
+    framebuffer = Framebuffer(("R", "Z"), (40, 40))
+    assert repr(framebuffer) == "<Framebuffer 40x40, channels R Z, 0% done>"
+    framebuffer.put(3, np.zeros((2, 8, 8), np.float32))
+    assert repr(framebuffer) == "<Framebuffer 40x40, channels R Z, 25% done>"

@@ -1,4 +1,4 @@
-"""The film: finished tiles become named channels, in memory; `store.py` has the film on disk."""
+"""The framebuffer: finished tiles become named channels, in memory; `store.py` has the one on disk."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ class _Known:
         return _Known, (self.facts,)
 
 
-class Film:
-    """A picture in memory: `film["R"]` is a float32 array of shape (height, width) of the region.
+class Framebuffer:
+    """A picture in memory: `framebuffer["R"]` is a float32 array of shape (height, width) of the region.
 
     R, G, B are linear Rec. 709; if the background is transparent they are premultiplied by A.
     `header` may hold: `scene` (text), `version`, `device`, `precision`, `seconds`, `exposure` (stops), `tone` (a curve) and
@@ -79,8 +79,8 @@ class Film:
         self.grid = TileGrid(self.region)
         self._header = _Known(header or {})
         self._stats = _Known({})
-        self.prober: Callable[[Film, int, int], Probe] | None = None
-        """Answers `probe`, of a film that was rendered."""
+        self.prober: Callable[[Framebuffer, int, int], Probe] | None = None
+        """Answers `probe`, of a framebuffer that was rendered."""
         self.inputs: tuple[Path, ...] = ()
         """Files that were read for the picture; `save` replaces none of them."""
         self.mixed_from: Picture | None = None
@@ -102,7 +102,7 @@ class Film:
     @property
     def makers(self) -> Provenance:
         """The former name of `provenance`."""
-        warnings.warn("Film.makers is Film.provenance", DeprecationWarning, stacklevel=2)
+        warnings.warn("Framebuffer.makers is Framebuffer.provenance", DeprecationWarning, stacklevel=2)
         return self.provenance
 
     @property
@@ -114,7 +114,7 @@ class Film:
     def stats(self) -> dict[str, Any]:
         """What the render took and what it counted, with the keys of `--stats`; empty if nothing was rendered.
 
-        Times of a film of a refinement are those of all its passes so far. `wall_ms` has no time for files.
+        Times of a framebuffer of a refinement are those of all its passes so far. `wall_ms` has no time for files.
         """
         return self._stats.facts
 
@@ -150,7 +150,7 @@ class Film:
         """One channel, shape (height, width).
 
         Raises:
-            KeyError: the film has no such channel.
+            KeyError: the framebuffer has no such channel.
         """
         try:
             return self._planes[name]
@@ -171,14 +171,14 @@ class Film:
         self._planes = dict(zip(self.channels, self._data, strict=True))
 
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
-        """The colours R, G, B, float32 of shape (height, width, 3); `np.asarray(film)` calls this.
+        """The colours R, G, B, float32 of shape (height, width, 3); `np.asarray(framebuffer)` calls this.
 
         Raises:
-            KeyError: the film has no R, G, B.
+            KeyError: the framebuffer has no R, G, B.
             ValueError: `copy` is False: channels lie one after the other in memory, colours side by side.
         """
         if copy is False:
-            raise ValueError("the colours of a film cannot be an array without copying them")
+            raise ValueError("the colours of a framebuffer cannot be an array without copying them")
         colors = np.stack([self["R"], self["G"], self["B"]], axis=-1)
         return colors if dtype is None else colors.astype(dtype, copy=False)
 
@@ -186,7 +186,7 @@ class Film:
         part = "" if self.region == Region(0, 0, *self.display) else f", {self.region}"
         size = f"{self.display[0]}x{self.display[1]}"
         stage = self.stage or f"{self._done.mean():.0%} done"
-        return f"<Film {size}{part}, channels {' '.join(self.channels)}, {stage}>"
+        return f"<Framebuffer {size}{part}, channels {' '.join(self.channels)}, {stage}>"
 
     def put(self, tile_index: int, array: Floats) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns)."""
@@ -197,14 +197,14 @@ class Film:
         self._done[tile_index] = True
 
     def put_tiles(
-        self, indices: npt.NDArray[np.int32], film: Floats, render_device: RenderDevice | None = None
+        self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
     ) -> None:
         """Stores whole tiles, float32 of shape (tiles, channels, TILE, TILE), as far as they lie in the region."""
         if render_device is not None:
             self.provenance.put(indices, render_device)
         region, data = self.region, self._data
         boxes = self.grid.boxes(indices).tolist()
-        for (x, y, width, height), array in zip(boxes, film, strict=True):
+        for (x, y, width, height), array in zip(boxes, framebuffer, strict=True):
             top, left = y % TILE, x % TILE
             part = array[:, top : top + height, left : left + width]
             data[:, y - region.y : y - region.y + height, x - region.x : x - region.x + width] = part
@@ -216,21 +216,21 @@ class Film:
             self._planes[name][:] = planes[name]
         self._done[:] = True
 
-    def with_planes(self, planes: Mapping[str, Floats]) -> Film:
+    def with_planes(self, planes: Mapping[str, Floats]) -> Framebuffer:
         """The same picture with other channels: of each float32 of shape (height, width)."""
-        film = Film(tuple(planes), self.display, self.region, lambda: self.header)
-        film.fill(planes)
-        film._done[:] = self.done
-        film.provenance, film.prober, film.inputs, film.stage = (
+        framebuffer = Framebuffer(tuple(planes), self.display, self.region, lambda: self.header)
+        framebuffer.fill(planes)
+        framebuffer._done[:] = self.done
+        framebuffer.provenance, framebuffer.prober, framebuffer.inputs, framebuffer.stage = (
             self.provenance,
             self.prober,
             self.inputs,
             self.stage,
         )
-        return film
+        return framebuffer
 
-    def take(self, other: Film) -> None:
-        """Copies another film of the same region."""
+    def take(self, other: Framebuffer) -> None:
+        """Copies another framebuffer of the same region."""
         for name in self.channels:
             self._planes[name][:] = other[name]
         self._done[:] = other.done
@@ -248,18 +248,18 @@ class Film:
     def probe(self, x: int, y: int) -> Probe:
         """What lies at a pixel: the point, its normal, depth and distance, counts.
 
-        A film that has the channels Z, N, P, iterations and steps tells it from them; of several samples they have
-        the one nearest to the pixel's middle. For any other film one ray is rendered, through the pixel's middle.
+        A framebuffer that has the channels Z, N, P, iterations and steps tells it from them; of several samples they have
+        the one nearest to the pixel's middle. For any other framebuffer one ray is rendered, through the pixel's middle.
 
         Args:
             x, y: the pixel, from the top left of the whole picture, as of `region`.
 
         Raises:
-            SceneError: the film does not hold that pixel, or was not made by a render.
-            DeviceError, KernelBuildError: a ray is needed, and the film's device is gone or failed.
+            SceneError: the framebuffer does not hold that pixel, or was not made by a render.
+            DeviceError, KernelBuildError: a ray is needed, and the framebuffer's device is gone or failed.
         """
         if self.prober is None:
-            raise SceneError("only films that were rendered can be probed", Where())
+            raise SceneError("only framebuffers that were rendered can be probed", Where())
         return self.prober(self, x, y)
 
     def save(self, path: str | Path, **settings: Any) -> None:
@@ -293,7 +293,7 @@ class Film:
             tone: the curve: linear, reinhard or agx; as the scene says if None.
 
         Raises:
-            KeyError: the film has no R, G, B.
+            KeyError: the framebuffer has no R, G, B.
             SceneError: the exposure is no number from -100 to 100.
         """
         return rgb8(self, Development.of(self.header, exposure, tone))
@@ -302,7 +302,7 @@ class Film:
         """The picture as an image of Pillow: the pixels of an 8-bit PNG; RGBA if the background is transparent.
 
         Raises:
-            KeyError: the film has no R, G, B.
+            KeyError: the framebuffer has no R, G, B.
         """
         from clfractal.images.convert import to_image
 
@@ -329,14 +329,14 @@ class Film:
         return png_bytes(self)
 
 
-def in_memory(picture: Picture) -> Film:
-    """A whole picture as a film; returned unchanged if it is a film."""
-    if isinstance(picture, Film):
+def in_memory(picture: Picture) -> Framebuffer:
+    """A whole picture as a framebuffer; returned unchanged if it is a framebuffer."""
+    if isinstance(picture, Framebuffer):
         return picture
     bands = [band for _, band in picture.bands()]
-    film = Film(picture.channels, picture.display, picture.region, picture.header)
-    film.fill({name: np.concatenate([band[name] for band in bands]) for name in picture.channels})
-    film.stereo = getattr(picture, "stereo", None)
-    if film.stereo is not None and film.stereo.mixes_colors:
-        film.mixed_from = picture
-    return film
+    framebuffer = Framebuffer(picture.channels, picture.display, picture.region, picture.header)
+    framebuffer.fill({name: np.concatenate([band[name] for band in bands]) for name in picture.channels})
+    framebuffer.stereo = getattr(picture, "stereo", None)
+    if framebuffer.stereo is not None and framebuffer.stereo.mixes_colors:
+        framebuffer.mixed_from = picture
+    return framebuffer

@@ -13,7 +13,7 @@ INLINE color background_of(real y, world w) {
 }
 
 // What is seen along a ray from row `y` of the picture.
-INLINE shot take_shot(ray r, real y, real time, mask wanted, world w, sight *e, real *steps) {
+INLINE pixel_sample volume_sample(ray r, real y, real time, mask wanted, world w, sight *e, real *steps) {
     ray kept = r;
     mask active = wanted;
     plane_face face = {R(0.0), R(0.0), R(0.0), color_of(R(0.0), R(0.0), R(0.0)), vec_scale(r.direction, R(-1.0))};
@@ -28,7 +28,7 @@ INLINE shot take_shot(ray r, real y, real time, mask wanted, world w, sight *e, 
     sight_grid(e, r, g, active, bare, &face, wanted, w, &looked);
     const color background = background_of(y, w);
     const real told = e->value * (real)(w.settings->value_scale) + (real)(w.settings->value_offset);
-    shot s = {.radiance = color_add(e->light, color_scale(background, e->through)), .hit = e->found, .coverage = R(1.0) - e->through,
+    pixel_sample s = {.radiance = color_add(e->light, color_scale(background, e->through)), .hit = e->found, .coverage = R(1.0) - e->through,
               .normal = e->normal, .point = vec_along(r.origin, e->t, r.direction), .smooth = pick(e->on_plane, e->value, told),
               .steps = looked};
     s.depth = depth_of(s.point, time, w.view);

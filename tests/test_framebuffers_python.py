@@ -1,4 +1,4 @@
-"""Films as Python users have them: arrays, images, data sets, statistics, copies in other processes."""
+"""Framebuffers as Python users have them: arrays, images, data sets, statistics, copies in other processes."""
 
 from __future__ import annotations
 
@@ -14,38 +14,38 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from tests.shell import SCENE, InProcess
 
 PAIR = SCENE + "stereo: {screen_width: 0.6, screen_distance: 0.7}\n"
 
 
 @pytest.fixture(scope="module")
-def film() -> Film:
+def framebuffer() -> Framebuffer:
     return clfractal.render(SCENE)
 
 
-def test_an_array_of_a_film_has_its_colours_side_by_side(film: Film) -> None:
-    colors = np.asarray(film)
+def test_an_array_of_a_film_has_its_colours_side_by_side(framebuffer: Framebuffer) -> None:
+    colors = np.asarray(framebuffer)
     assert colors.shape == (36, 40, 3)
     assert colors.dtype == np.float32
     for component, name in enumerate("RGB"):
-        np.testing.assert_array_equal(colors[..., component], film[name])
-    assert np.asarray(film, np.float64).dtype == np.float64
-    colors[:] = 7  # a copy: the film stays as it was
-    assert film["R"].max() < 7
+        np.testing.assert_array_equal(colors[..., component], framebuffer[name])
+    assert np.asarray(framebuffer, np.float64).dtype == np.float64
+    colors[:] = 7  # a copy: the framebuffer stays as it was
+    assert framebuffer["R"].max() < 7
     with pytest.raises(ValueError, match="without copying"):
-        np.array(film, copy=False)
+        np.array(framebuffer, copy=False)
     with pytest.raises(KeyError, match="unknown channel"):
-        np.asarray(Film(["Z"], (2, 2)))
+        np.asarray(Framebuffer(["Z"], (2, 2)))
 
 
-def test_an_image_has_the_pixels_of_a_png(film: Film) -> None:
-    image = film.to_image()
+def test_an_image_has_the_pixels_of_a_png(framebuffer: Framebuffer) -> None:
+    image = framebuffer.to_image()
     assert (image.mode, image.size) == ("RGB", (40, 36))
-    np.testing.assert_array_equal(np.asarray(image), film.to_rgb8())
+    np.testing.assert_array_equal(np.asarray(image), framebuffer.to_rgb8())
     with pytest.raises(KeyError, match="unknown channel"):
-        Film(["Z"], (2, 2)).to_image()
+        Framebuffer(["Z"], (2, 2)).to_image()
 
 
 def test_an_image_is_as_bright_and_as_transparent_as_the_scene_says(tmp_path: Path) -> None:
@@ -75,7 +75,7 @@ def test_a_data_set_names_every_channel(tmp_path: Path) -> None:
     assert all(isinstance(value, (str, int, float)) for value in found.attrs.values())
 
 
-def test_a_data_set_needs_xarray(film: Film, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_data_set_needs_xarray(framebuffer: Framebuffer, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = builtins.__import__
 
     def without(name: str, *rest: Any, **more: Any) -> Any:
@@ -85,7 +85,7 @@ def test_a_data_set_needs_xarray(film: Film, monkeypatch: pytest.MonkeyPatch) ->
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(clfractal.FileError, match="pip install xarray"):
-        film.to_xarray()
+        framebuffer.to_xarray()
 
 
 def test_a_film_has_the_statistics_that_the_shell_writes(
@@ -111,17 +111,17 @@ def test_a_film_has_the_statistics_that_the_shell_writes(
     json.dumps(left.stats)
 
 
-def test_the_counts_of_a_film_are_its_rays(film: Film) -> None:
-    assert film.stats["rays"] == 36 * 40
-    assert (film.stats["width"], film.stats["height"]) == (40, 36)
-    assert film.stats["samples"] == 1
-    assert film.stats["steps_per_ray"] > 1
-    assert Film().stats == {}
+def test_the_counts_of_a_film_are_its_rays(framebuffer: Framebuffer) -> None:
+    assert framebuffer.stats["rays"] == 36 * 40
+    assert (framebuffer.stats["width"], framebuffer.stats["height"]) == (40, 36)
+    assert framebuffer.stats["samples"] == 1
+    assert framebuffer.stats["steps_per_ray"] > 1
+    assert Framebuffer().stats == {}
 
 
 def test_a_refinement_counts_all_its_passes() -> None:
     with clfractal.Engine() as engine:
-        rays = [film.stats["rays"] for film in engine.refine(SCENE, samples=4)]
+        rays = [framebuffer.stats["rays"] for framebuffer in engine.refine(SCENE, samples=4)]
         once = engine.render(SCENE, samples=4).stats
     coarse = [5 * 5, 10 * 9, 20 * 18]
     whole = 40 * 36
@@ -135,26 +135,26 @@ def test_parallax_is_unknown_without_depth() -> None:
     assert pair.stats["stereo"]["mode"] == "anaglyph"
 
 
-def test_a_film_goes_to_another_process_and_back(film: Film, tmp_path: Path) -> None:
-    size = sum(film[name].nbytes for name in film)
-    written = pickle.dumps(film)
+def test_a_film_goes_to_another_process_and_back(framebuffer: Framebuffer, tmp_path: Path) -> None:
+    size = sum(framebuffer[name].nbytes for name in framebuffer)
+    written = pickle.dumps(framebuffer)
     assert len(written) < 1.2 * size + 20_000  # each channel once
     again = pickle.loads(written)
     assert (again.channels, again.region, again.display, again.stage) == (
-        film.channels,
-        film.region,
-        film.display,
+        framebuffer.channels,
+        framebuffer.region,
+        framebuffer.display,
         "",
     )
-    for name in film:
-        np.testing.assert_array_equal(again[name], film[name])
-    assert again.stats == film.stats
+    for name in framebuffer:
+        np.testing.assert_array_equal(again[name], framebuffer[name])
+    assert again.stats == framebuffer.stats
     assert again.done.all()
     again["R"][0, 0] = 5
     assert np.asarray(again)[0, 0, 0] == 5  # channels and data are one
-    assert repr(again) == repr(film)
+    assert repr(again) == repr(framebuffer)
     again.save(tmp_path / "a.png")
-    assert clfractal.load_scene(tmp_path / "a.png") == clfractal.load_scene(film.header["scene"])
+    assert clfractal.load_scene(tmp_path / "a.png") == clfractal.load_scene(framebuffer.header["scene"])
     stream = io.BytesIO()
-    film.to_image().save(stream, "PNG")
+    framebuffer.to_image().save(stream, "PNG")
     assert stream.getvalue()

@@ -1,9 +1,9 @@
-// Shots as pixels keep them: what has been seen, put together with all that lies before and behind it.
+// Samples as pixels keep them: what has been seen, put together with all that lies before and behind it.
 
-// The normal by which a shot's first surface has scattered light; `own` is the surface's.
+// The normal by which a sample's first surface has scattered light; `own` is the surface's.
 INLINE vec normal_seen(aovs outputs, vec own, world w) { return HAS(w, BUMP) ? outputs.normal : own; }
 
-// A shot's layers, of the part of its surface that is in the picture: `comes`. Of what its path has seen in all, that part is light; and a
+// A sample's layers, of the part of its surface that is in the picture: `comes`. Of what its path has seen in all, that part is light; and a
 // surface that fog hides must not tell the filter of detail where there is none.
 INLINE parts parts_of(aovs outputs, color seen, vec normal, real comes, world w) {
     parts found;
@@ -16,7 +16,7 @@ INLINE parts parts_of(aovs outputs, color seen, vec normal, real comes, world w)
     return found;
 }
 
-// Keeps what the first spot reflects, white where it is a light, the light seen so far, and the normal of its relief, where it has one.
+// Keeps what the first interaction reflects, white where it is a light, the light seen so far, and the normal of its relief, where it has one.
 INLINE void aovs_begin(stage s, mask surface, color albedo, color seen, vec normal) {
     aovs outputs;
     outputs.albedo = color_pick(surface, albedo, color_of(R(1.0), R(1.0), R(1.0)));
@@ -32,14 +32,14 @@ INLINE void aovs_once(stage s, color seen) {
     STATE_KEEP(s, outputs, STATE_AOVS);
 }
 
-// The shot at its end: what its path has seen, over the background; and what it has found first.
-INLINE shot shot_of(stage s, camera_sample a, ray from_eye, color seen, const spot *here, world w) {
+// The sample at its end: what its path has seen, over the background; and what it has found first.
+INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen, const interaction *here, world w) {
     STATE_KEPT(s, sighting, first, STATE_SIGHTING);
-    spot found = *here;
-    if (s.bounce > 0) found = spot_kept(s, 0);
+    interaction found = *here;
+    if (s.bounce > 0) found = interaction_kept(s, 0);
     const color in_all = seen;
     const color on_the_way = color_pick(mask_of(found.found), color_of(R(0.0), R(0.0), R(0.0)), seen);
-    shot result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
+    pixel_sample result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
     result.thing = pick(result.hit, thing_cut(found.object) + R(1.0), R(0.0));
     result.covers = result.coverage;
     result.depth = depth_of(result.point, a.time, w.view);
@@ -96,38 +96,38 @@ INLINE shot shot_of(stage s, camera_sample a, ray from_eye, color seen, const sp
     type sum = {0};                                                                                             \
     if ((s).sample > (s).span.first) STATE_RECALL(s, sum, part);                                                \
     else if ((s).span.first > 0) numbers((here)->kept, (s).span.slots + CHANNEL_COUNT, 0, &sum)
-#define SUMS_AFTER(s, here, sum, shots, part, numbers, write)                                                      \
+#define SUMS_AFTER(s, here, sum, samples, part, numbers, write)                                                      \
     if ((s).sample + 1 < (s).span.end) {                                                                        \
         STATE_KEEP(s, sum, part);                                                                               \
         return;                                                                                                 \
     }                                                                                                           \
-    __global float *tile_ = (s).span.film + (here)->tile * (s).span.channel_count * TILE_PIXELS;                \
-    write(tile_, (s).span.slots, (here)->at.place, &sum, shots);                                                \
+    __global float *tile_ = (s).span.framebuffer + (here)->tile * (s).span.channel_count * TILE_PIXELS;                \
+    write(tile_, (s).span.slots, (here)->at.place, &sum, samples);                                                \
     if ((s).span.mode & PASS_KEEP) numbers((here)->kept, (s).span.slots + CHANNEL_COUNT, 1, &sum)
 
-// Adds the shots' layers to their pixels' sums.
-INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wanted, real shots) {
+// Adds the samples' layers to their pixels' sums.
+INLINE void end_parts(stage s, const place_in_pass *here, parts more, mask wanted, real samples) {
     SUMS_BEFORE(s, here, parts, sum, STATE_PARTS, kept_parts);
     parts_add(&sum, more, wanted);
-    SUMS_AFTER(s, here, sum, shots, STATE_PARTS, kept_parts, parts_write);
+    SUMS_AFTER(s, here, sum, samples, STATE_PARTS, kept_parts, parts_write);
 }
 
 // Likewise which things they show; `sums` are those before.
-INLINE void end_mattes(stage s, const place_in_pass *here, const pixel *sums, shot found, mask wanted, real offset) {
-    SUMS_BEFORE(s, here, mattes, sum, STATE_MATTES, kept_mattes);
-    mattes_add(&sum, found.thing, found.covers, wanted, wanted & less(offset, sums->nearest));
-    SUMS_AFTER(s, here, sum, sums->shots + number_of(wanted), STATE_MATTES, kept_mattes, mattes_write);
+INLINE void end_cryptomatte(stage s, const place_in_pass *here, const pixel *sums, pixel_sample found, mask wanted, real offset) {
+    SUMS_BEFORE(s, here, cryptomatte, sum, STATE_CRYPTOMATTE, kept_cryptomatte);
+    cryptomatte_add(&sum, found.thing, found.covers, wanted, wanted & less(offset, sums->nearest));
+    SUMS_AFTER(s, here, sum, sums->samples + number_of(wanted), STATE_CRYPTOMATTE, kept_cryptomatte, cryptomatte_write);
 }
 
-// Adds the shots to their pixels' sums; after the launch's last sample these are written.
-INLINE void end_shots(stage s, camera_sample a, color seen, const spot *here, counters cost, world w) {
+// Adds the samples to their pixels' sums; after the launch's last sample these are written.
+INLINE void end_samples(stage s, camera_sample a, color seen, const interaction *here, counters cost, world w) {
     const place_in_pass at = place_of_packet(s.span, s.packet, s.tile);
     const mask wanted = mask_of(a.wanted);
-    const shot found = shot_of(s, a, eye_ray(&a, w.view), seen, here, w);
+    const pixel_sample found = sample_of(s, a, eye_ray(&a, w.view), seen, here, w);
     pixel p = sums_before(s, &at);
-    if (KEEPS(s, STATE_MATTES)) end_mattes(s, &at, &p, found, wanted, a.offset);
+    if (KEEPS(s, STATE_CRYPTOMATTE)) end_cryptomatte(s, &at, &p, found, wanted, a.offset);
     sample_add(s.span, &p, found, wanted, a.offset);
-    if (KEEPS(s, STATE_PARTS)) end_parts(s, &at, found.of_light, wanted, p.shots);
+    if (KEEPS(s, STATE_PARTS)) end_parts(s, &at, found.of_light, wanted, p.samples);
     const mask hit = wanted & less(R(0.0), found.coverage);
     pass_count(&at, (s.span.mode & PASS_ADD) || s.sample > s.span.first, a.wanted, number_of(hit), cost);
     if (s.sample + 1 < s.span.end) {

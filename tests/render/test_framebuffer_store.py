@@ -1,4 +1,4 @@
-"""The film on disk, and the files that films are written to."""
+"""The framebuffer on disk, and the files that framebuffers are written to."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
-from clfractal.images.film import Film
 from clfractal.images.formats import Content, check_output
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.outputs import save_outputs
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import TiledStore
 from clfractal.images.tiles import Region
 from tests.files.limits import file_size_limit
@@ -45,7 +45,7 @@ def tile_content(store: TiledStore, index: int) -> np.ndarray:
     return np.random.default_rng(index).random(shape, dtype=np.float32)
 
 
-def fill(store: Film | JournalFilm, indices: range | None = None) -> None:
+def fill(store: Framebuffer | JournalFramebuffer, indices: range | None = None) -> None:
     for index in indices or range(store.grid.count):
         store.put(index, tile_content(store, index))
 
@@ -57,8 +57,8 @@ def whole(store: TiledStore) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("region", [None, PART])
 def test_both_stores_hold_the_same_picture(tmp_path: Path, region: Region | None) -> None:
-    memory = Film(ALL, (150, 100), region)
-    disk = JournalFilm(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), region)
+    memory = Framebuffer(ALL, (150, 100), region)
+    disk = JournalFramebuffer(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), region)
     for store in (memory, disk):
         # Tile 5 is never rendered.
         fill(store, range(5))
@@ -68,19 +68,19 @@ def test_both_stores_hold_the_same_picture(tmp_path: Path, region: Region | None
     for name, plane in whole(memory).items():
         assert np.array_equal(plane, memory[name])
         assert np.array_equal(plane, whole(disk)[name])
-        assert np.array_equal(plane, disk.to_film()[name])
+        assert np.array_equal(plane, disk.to_framebuffer()[name])
     assert np.isinf(memory["Z"]).sum() == 32 * 32
 
 
 def test_a_resumed_picture_is_the_same(tmp_path: Path) -> None:
     path = tmp_path / "a.partial"
-    first = JournalFilm(path, IDENTITY, ALL, (150, 100))
+    first = JournalFramebuffer(path, IDENTITY, ALL, (150, 100))
     fill(first, range(7))
     first.close()
-    second = JournalFilm(path, IDENTITY, ALL, (150, 100), resume=True)
+    second = JournalFramebuffer(path, IDENTITY, ALL, (150, 100), resume=True)
     assert np.flatnonzero(second.done).tolist() == list(range(7))
     fill(second, range(7, second.grid.count))
-    straight = Film(ALL, (150, 100))
+    straight = Framebuffer(ALL, (150, 100))
     fill(straight)
     for name in ALL:
         assert whole(second)[name].tobytes() == straight[name].tobytes()
@@ -90,26 +90,26 @@ def test_a_resumed_picture_is_the_same(tmp_path: Path) -> None:
 
 def test_another_size_region_or_scene_is_not_resumed(tmp_path: Path) -> None:
     path = tmp_path / "a.partial"
-    JournalFilm(path, IDENTITY, ALL, (150, 100)).close()
+    JournalFramebuffer(path, IDENTITY, ALL, (150, 100)).close()
     for identity, display, region, message in (
         (IDENTITY, (150, 101), None, r"the region was .*, the size was \[150, 100\] and is \[150, 101\]"),
         (IDENTITY, (150, 100), PART, r"the region was \[0, 0, 150, 100\] and is \[10, 20, 90, 70\]"),
         ({**IDENTITY, "scene": "def"}, (150, 100), None, 'the scene was "abc" and is "def"'),
     ):
         with pytest.raises(FileError, match=message):
-            JournalFilm(path, identity, ALL, display, region, resume=True)
+            JournalFramebuffer(path, identity, ALL, display, region, resume=True)
 
 
 @pytest.mark.parametrize("region", [None, PART])
 def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
-    film = Film(ALL, (150, 100), region, HEADER)
-    fill(film)
-    save_outputs(film, [tmp_path / "a.exr", tmp_path / "a.png"])
+    framebuffer = Framebuffer(ALL, (150, 100), region, HEADER)
+    fill(framebuffer)
+    save_outputs(framebuffer, [tmp_path / "a.exr", tmp_path / "a.png"])
     planes, header = read_exr(tmp_path / "a.exr")
     assert set(planes) == set(ALL)
     for name in ALL:
         assert planes[name].dtype == (np.float16 if CHANNELS[name].precision == "half" else np.float32)
-        assert np.array_equal(planes[name], film[name].astype(planes[name].dtype))
+        assert np.array_equal(planes[name], framebuffer[name].astype(planes[name].dtype))
     assert header["displayWindow"] == (0, 0, 149, 99)
     assert header["dataWindow"] == ((10, 20, 99, 89) if region else (0, 0, 149, 99))
     assert header["software"] == "clfractal 0.1.0"
@@ -119,7 +119,7 @@ def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
     assert np.array_equal(header["worldToNDC"], np.eye(4))
     assert read_scene_text(tmp_path / "a.exr") == "version: 1\n"
     with Image.open(tmp_path / "a.png") as image:
-        assert np.array_equal(np.asarray(image), film.to_rgb8())
+        assert np.array_equal(np.asarray(image), framebuffer.to_rgb8())
     texts = read_texts(tmp_path / "a.png")
     assert texts["clfractal"] == "version: 1\n"
     assert texts["Software"] == "clfractal 0.1.0"
@@ -128,8 +128,8 @@ def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
 
 
 def test_a_film_on_disk_gives_the_same_files(tmp_path: Path) -> None:
-    memory = Film(ALL, (150, 100), PART, HEADER)
-    disk = JournalFilm(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), PART, HEADER)
+    memory = Framebuffer(ALL, (150, 100), PART, HEADER)
+    disk = JournalFramebuffer(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), PART, HEADER)
     for store, name in ((memory, "memory"), (disk, "disk")):
         fill(store)
         save_outputs(store, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
@@ -138,39 +138,39 @@ def test_a_film_on_disk_gives_the_same_files(tmp_path: Path) -> None:
 
 
 def test_settings(tmp_path: Path) -> None:
-    film = Film(("R", "G", "B", "A", "Z"), (40, 40))
-    fill(film)
-    film.save(tmp_path / "a.exr", half={"Z"}, header={"seconds": 1.0}, exposure=3)
+    framebuffer = Framebuffer(("R", "G", "B", "A", "Z"), (40, 40))
+    fill(framebuffer)
+    framebuffer.save(tmp_path / "a.exr", half={"Z"}, header={"seconds": 1.0}, exposure=3)
     planes, header = read_exr(tmp_path / "a.exr")
     assert planes["Z"].dtype == np.float16
-    assert np.array_equal(planes["R"], film["R"])
+    assert np.array_equal(planes["R"], framebuffer["R"])
     assert header["clfractalSeconds"] == 1
-    film.save(tmp_path / "a.png", exposure=-2)
+    framebuffer.save(tmp_path / "a.png", exposure=-2)
     with Image.open(tmp_path / "a.png") as image:
-        colors = np.stack([film[name] for name in "RGB"], axis=-1)
+        colors = np.stack([framebuffer[name] for name in "RGB"], axis=-1)
         assert np.array_equal(np.asarray(image), encode8(colors * np.float32(0.25)))
-    film.save(tmp_path / "b.png", transparent=True, bits=16)
+    framebuffer.save(tmp_path / "b.png", transparent=True, bits=16)
     with open(tmp_path / "b.png", "rb") as stream:
         # IHDR: width, height, then bits and colour type (6: RGB with alpha)
         assert stream.read(26)[16:] == bytes([0, 0, 0, 40, 0, 0, 0, 40, 16, 6])
 
 
 def test_extreme_pixels_make_no_trouble(tmp_path: Path) -> None:
-    film = Film(("R", "G", "B", "A", "Z"), (4, 4))
-    film["R"][:] = 3e38
-    film["G"][:] = np.inf
-    film["A"][:2] = 1e-40
+    framebuffer = Framebuffer(("R", "G", "B", "A", "Z"), (4, 4))
+    framebuffer["R"][:] = 3e38
+    framebuffer["G"][:] = np.inf
+    framebuffer["A"][:2] = 1e-40
     for transparent in (False, True):
-        film.save(tmp_path / "a.png", exposure=4, transparent=transparent)
-    film.save(tmp_path / "a.exr")
+        framebuffer.save(tmp_path / "a.png", exposure=4, transparent=transparent)
+    framebuffer.save(tmp_path / "a.exr")
     assert (read_exr(tmp_path / "a.exr")[0]["R"] == 65504).all()
 
 
 def test_outputs_are_checked_before_anything_is_written(tmp_path: Path) -> None:
-    film = Film(("R", "G", "B"), (4, 4))
+    framebuffer = Framebuffer(("R", "G", "B"), (4, 4))
     for bad, message in (("a.gif", "unknown extension '.gif'"), ("gone/a.exr", "there is no folder")):
         with pytest.raises(FileError, match=message):
-            save_outputs(film, [tmp_path / "good.png", tmp_path / bad])
+            save_outputs(framebuffer, [tmp_path / "good.png", tmp_path / bad])
     assert not list(tmp_path.iterdir())
     check_output(tmp_path / "a.exr", Content(("Z",), (4, 4), False, None, 90))
     with pytest.raises(
@@ -180,12 +180,12 @@ def test_outputs_are_checked_before_anything_is_written(tmp_path: Path) -> None:
 
 
 def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
-    film = Film(("R", "G", "B", "A", "Z"), (200, 200))
-    fill(film)
+    framebuffer = Framebuffer(("R", "G", "B", "A", "Z"), (200, 200))
+    fill(framebuffer)
     for name in ("a.exr", "a.png"):
         (tmp_path / name).write_bytes(b"old")
         with pytest.raises(FileError, match=f"{name}: cannot be written: "), file_size_limit(50_000):
-            film.save(tmp_path / name)
+            framebuffer.save(tmp_path / name)
         assert (tmp_path / name).read_bytes() == b"old"
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.exr", "a.png"]
 
@@ -193,21 +193,21 @@ def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 import numpy as np
-from clfractal.images.film import Film
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.outputs import save_outputs
-from clfractal.images.store import JournalFilm
+from clfractal.images.store import JournalFramebuffer
 
 def peak():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
 
 outputs = [sys.argv[1] + "/a.png", sys.argv[1] + "/a.exr"]
-save_outputs(Film(display=(64, 64)), outputs)
+save_outputs(Framebuffer(display=(64, 64)), outputs)
 before = peak()
-film = JournalFilm(sys.argv[1] + "/a.partial", {}, display=(4096, 2048))
+framebuffer = JournalFramebuffer(sys.argv[1] + "/a.partial", {}, display=(4096, 2048))
 tile = np.random.default_rng(0).random((5, 32, 32), dtype=np.float32)
-for index in range(film.grid.count):
-    film.put(index, tile)
-save_outputs(film, outputs)
+for index in range(framebuffer.grid.count):
+    framebuffer.put(index, tile)
+save_outputs(framebuffer, outputs)
 print(peak() - before)
 """
 

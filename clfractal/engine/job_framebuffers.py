@@ -1,4 +1,4 @@
-"""A job's films in memory, and the picture that is composed of them."""
+"""A job's framebuffers in memory, and the picture that is composed of them."""
 
 from __future__ import annotations
 
@@ -6,16 +6,16 @@ from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
-from clfractal.engine.comfort import comfort_of_films
+from clfractal.engine.comfort import comfort_of_framebuffers
 from clfractal.engine.finish import finished
 from clfractal.engine.job import Job
-from clfractal.engine.probing import FilmProber
+from clfractal.engine.probing import FramebufferProber
 from clfractal.engine.remarks import remarks_of
 from clfractal.engine.run import Progress
 from clfractal.engine.stats import statistics
 from clfractal.images.compose import Side
 from clfractal.images.develop import Development
-from clfractal.images.film import Film, in_memory
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.tiled import Picture
 
 
@@ -28,13 +28,15 @@ class Took:
     previews_built_ms: float = 0.0
 
 
-class JobFilms:
-    """An empty film for each of a job's views. Headers are made when a film of the job is first asked for its own."""
+class JobFramebuffers:
+    """An empty framebuffer for each of a job's views. Headers are made when a framebuffer of the job is first asked for
+    its own.
+    """
 
     def __init__(self, job: Job) -> None:
         self.job = job
-        self.films = [
-            Film(view.plan.channels, view.size, view.plan.region, partial(self._header_of, number))
+        self.framebuffers = [
+            Framebuffer(view.plan.channels, view.size, view.plan.region, partial(self._header_of, number))
             for number, view in enumerate(job.views)
         ]
 
@@ -49,37 +51,37 @@ class JobFilms:
         scene = self.job.scene
         return Development(scene.output.stops, scene.output.tone, scene.background == "transparent")
 
-    def picture(self, took: Took | None = None) -> Film:
+    def picture(self, took: Took | None = None) -> Framebuffer:
         """The picture, as far as it is finished. Not for a pair whose pictures stay apart.
 
         Args:
-            took: what it took so far, for `Film.stats`.
+            took: what it took so far, for `Framebuffer.stats`.
         """
-        composed = len(self.films) != 1
+        composed = len(self.framebuffers) != 1
         return self._whole(
-            self.job.picture(finished(self.job, self.films), self.header if composed else None),
+            self.job.picture(finished(self.job, self.framebuffers), self.header if composed else None),
             took,
-            FilmProber(self.job),
+            FramebufferProber(self.job),
         )
 
-    def eyes(self, took: Took | None = None) -> dict[Side, Film]:
-        """Each eye's picture; `took` as for `picture`: both films have the statistics of the pair."""
+    def eyes(self, took: Took | None = None) -> dict[Side, Framebuffer]:
+        """Each eye's picture; `took` as for `picture`: both framebuffers have the statistics of the pair."""
         return {
-            side: self._whole(picture, took, FilmProber(self.job, side))
-            for side, picture in self.job.eyes(finished(self.job, self.films)).items()
+            side: self._whole(picture, took, FramebufferProber(self.job, side))
+            for side, picture in self.job.eyes(finished(self.job, self.framebuffers)).items()
         }
 
-    def _whole(self, picture: Picture, took: Took | None, prober: FilmProber) -> Film:
-        film = in_memory(picture)
-        film.prober = prober
-        film.inputs = self.job.scene.files
+    def _whole(self, picture: Picture, took: Took | None, prober: FramebufferProber) -> Framebuffer:
+        framebuffer = in_memory(picture)
+        framebuffer.prober = prober
+        framebuffer.inputs = self.job.scene.files
         if took is not None:
-            film.tell_stats(partial(self._statistics, took))
-        return film
+            framebuffer.tell_stats(partial(self._statistics, took))
+        return framebuffer
 
     def _statistics(self, took: Took) -> dict[str, Any]:
-        comfort = comfort_of_films(self.job, self.films)
-        remarks = remarks_of(self.job, took.state, self.films, comfort)
+        comfort = comfort_of_framebuffers(self.job, self.framebuffers)
+        remarks = remarks_of(self.job, took.state, self.framebuffers, comfort)
         return statistics(
             self.job,
             took.state,

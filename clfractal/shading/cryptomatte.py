@@ -14,7 +14,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.files.channels import MATERIAL_MATTES, MATTE_RANKS, MATTES, OBJECT_MATTES
+from clfractal.files.channels import (
+    CRYPTOMATTE_MATERIALS,
+    CRYPTOMATTE_OBJECTS,
+    CRYPTOMATTE_RANKS,
+    ID_CHANNELS,
+)
 from clfractal.schema.shape import ObjectBase
 
 if TYPE_CHECKING:
@@ -59,27 +64,30 @@ def materials_of(scene: Scene) -> Things:
     return Things(names, (number(own), *(number(each.material or own) for each in bodies)))
 
 
-def told(film: Floats, channels: Sequence[str], scene: Scene) -> Floats:
-    """A film of the kernel, shape (tiles, channels, rows, columns), with what its channels of things tell in the end."""
-    if set(MATTES).isdisjoint(channels):
-        return film
-    made = film.copy()
+def told(framebuffer: Floats, channels: Sequence[str], scene: Scene) -> Floats:
+    """A framebuffer of the kernel, shape (tiles, channels, rows, columns), with what its channels of things tell in the
+    end.
+    """
+    if set(ID_CHANNELS).isdisjoint(channels):
+        return framebuffer
+    made = framebuffer.copy()
     for number, layer, things in (
-        ("object", OBJECT_MATTES, objects_of(scene)),
-        ("material", MATERIAL_MATTES, materials_of(scene)),
+        ("object", CRYPTOMATTE_OBJECTS, objects_of(scene)),
+        ("material", CRYPTOMATTE_MATERIALS, materials_of(scene)),
     ):
         numbers = np.array([0, *things.numbers])
         if number in channels:
             at = channels.index(number)
-            made[:, at] = numbers[film[:, at].astype(int)]
+            made[:, at] = numbers[framebuffer[:, at].astype(int)]
         if not set(layer).isdisjoint(channels):
             places = [channels.index(name) for name in layer]
-            made[:, places] = ranked(film[:, places], numbers, things.identifiers())
+            made[:, places] = ranked(framebuffer[:, places], numbers, things.identifiers())
     return made
 
 
 def ranked(pairs: Floats, numbers: npt.NDArray[np.int64], identifiers: Floats) -> Floats:
-    """Pairs of a thing and its coverage, shape (tiles, 2 MATTE_RANKS, ...), as pairs of names, the largest coverage first.
+    """Pairs of a thing and its coverage, shape (tiles, 2 CRYPTOMATTE_RANKS, ...), as pairs of names, the largest
+    coverage first.
 
     Args:
         numbers: of each of the kernel's things, from 0 for none, the number of its name, 0 for none.
@@ -88,7 +96,7 @@ def ranked(pairs: Floats, numbers: npt.NDArray[np.int64], identifiers: Floats) -
     name = numbers[pairs[:, ::2].astype(int)]
     covers = np.where(name > 0, pairs[:, 1::2], 0)
     # What has the same name is one: its first rank takes all.
-    for later in range(1, MATTE_RANKS):
+    for later in range(1, CRYPTOMATTE_RANKS):
         for rank in range(later):
             same = (name[:, rank] == name[:, later]) & (name[:, later] > 0)
             covers[:, rank] += np.where(same, covers[:, later], 0)
@@ -110,8 +118,8 @@ def attributes(scene: Scene, channels: Sequence[str]) -> dict[str, str | list[st
     if "material" in channels:
         found["materials"] = list(materials_of(scene).names)
     for name, layer, things in (
-        ("CryptoObject", OBJECT_MATTES, objects_of(scene)),
-        ("CryptoMaterial", MATERIAL_MATTES, materials_of(scene)),
+        ("CryptoObject", CRYPTOMATTE_OBJECTS, objects_of(scene)),
+        ("CryptoMaterial", CRYPTOMATTE_MATERIALS, materials_of(scene)),
     ):
         if set(layer).isdisjoint(channels):
             continue

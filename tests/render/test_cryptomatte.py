@@ -15,13 +15,13 @@ import pytest
 import clfractal
 from clfractal.device.select import Device
 from clfractal.errors import SceneError
-from clfractal.files.channels import MATERIAL_MATTES, MATTES, NUMBERED, OBJECT_MATTES
+from clfractal.files.channels import CRYPTOMATTE_MATERIALS, CRYPTOMATTE_OBJECTS, ID_CHANNELS, NUMBERED
 from clfractal.files.exr import read_exr
-from clfractal.images.film import Film
-from clfractal.integrators import carried
+from clfractal.images.framebuffer import Framebuffer
+from clfractal.integrators import path_state
 from clfractal.integrators.state import state_numbers
 from clfractal.integrators.surface import program_texts
-from clfractal.shading.mattes import bits_of, identifier, murmur3, ranked
+from clfractal.shading.cryptomatte import bits_of, identifier, murmur3, ranked
 from tests.render.path_scenes import path, scene_of
 from tests.render.shots import plan_of, repeated
 from tests.variants import one_of
@@ -44,12 +44,12 @@ SECTIONS: dict[str, Any] = {
 }
 
 
-def coverage(film: Film, layer: str, name: str) -> Floats:
+def coverage(framebuffer: Framebuffer, layer: str, name: str) -> Floats:
     """What a name covers of each pixel."""
-    wanted, sums = np.float32(identifier(name)), np.zeros(film["A"].shape)
+    wanted, sums = np.float32(identifier(name)), np.zeros(framebuffer["A"].shape)
     for rank in range(6):
         of, part = (f"{layer}{rank // 2:02d}.{'RGBA'[2 * (rank % 2) + place]}" for place in (0, 1))
-        sums += np.where(film[of] == wanted, film[part], 0)
+        sums += np.where(framebuffer[of] == wanted, framebuffer[part], 0)
     return sums
 
 
@@ -69,10 +69,12 @@ def lens(radius: float, other: float, apart: float) -> float:
 @pytest.mark.parametrize("lighting", [{}, path(1)])
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_areas_of_things(lighting: dict[str, Any], precision: str) -> None:
-    channels = ["A", *MATTES]
-    film = clfractal.render(scene_of(**SECTIONS, lighting=lighting), channels=channels, precision=precision)
+    channels = ["A", *ID_CHANNELS]
+    framebuffer = clfractal.render(
+        scene_of(**SECTIONS, lighting=lighting), channels=channels, precision=precision
+    )
     pixel = (HEIGHT / PIXELS) ** 2
-    areas = {name: coverage(film, "CryptoObject", name).sum() * pixel for name in ("set", *OBJECTS)}
+    areas = {name: coverage(framebuffer, "CryptoObject", name).sum() * pixel for name in ("set", *OBJECTS)}
     apart = math.hypot(1, 0.2)
     box = 0.6 * 0.4
     assert areas["near"] == pytest.approx(math.pi * 0.25, rel=0.01)
@@ -80,18 +82,18 @@ def test_areas_of_things(lighting: dict[str, Any], precision: str) -> None:
     assert areas["far"] == pytest.approx(math.pi * 0.16 - lens(1, 0.4, 1), rel=0.02)
     behind_box = sum(1 for x, z in grid() if math.hypot(x, z) < 1) / 10_000 * box
     assert areas["set"] == pytest.approx(math.pi - lens(1, 0.5, apart) - behind_box, rel=0.01)
-    red = coverage(film, "CryptoMaterial", "red").sum() * pixel
+    red = coverage(framebuffer, "CryptoMaterial", "red").sum() * pixel
     assert red == pytest.approx(areas["near"] + areas["third"], rel=1e-6)
-    for layer in (OBJECT_MATTES, MATERIAL_MATTES):
-        parts = np.stack([film[name] for name in layer[1::2]])
-        np.testing.assert_allclose(parts.sum(axis=0), film["A"], atol=1e-6)
+    for layer in (CRYPTOMATTE_OBJECTS, CRYPTOMATTE_MATERIALS):
+        parts = np.stack([framebuffer[name] for name in layer[1::2]])
+        np.testing.assert_allclose(parts.sum(axis=0), framebuffer["A"], atol=1e-6)
         assert (np.diff(parts, axis=0) <= 0).all()
         assert (parts[1] > 0).any()
     middle = PIXELS // 2
-    assert (film["object"][middle, middle], film["material"][middle, middle]) == (1, 3)
+    assert (framebuffer["object"][middle, middle], framebuffer["material"][middle, middle]) == (1, 3)
     right = middle + round(1 / (HEIGHT / PIXELS))
-    assert (film["object"][middle, right], film["material"][middle, right]) == (2, 1)
-    assert (film["object"][0, 0], film["material"][0, 0]) == (0, 0)
+    assert (framebuffer["object"][middle, right], framebuffer["material"][middle, right]) == (2, 1)
+    assert (framebuffer["object"][0, 0], framebuffer["material"][0, 0]) == (0, 0)
 
 
 def grid() -> list[tuple[float, float]]:
@@ -102,7 +104,7 @@ def grid() -> list[tuple[float, float]]:
 
 @pytest.mark.combination
 def test_they_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
-    scene, names = scene_of(**SECTIONS, lighting=path(1)), [*MATTES]
+    scene, names = scene_of(**SECTIONS, lighting=path(1)), [*ID_CHANNELS]
     whole, single = repeated(scene, device, names)
     for name in names:
         assert np.mean(single[name] != whole[name]) < 0.02
@@ -110,30 +112,34 @@ def test_they_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
 
 def test_adaptive_pixels_have_all_of_their_coverage() -> None:
     sections = {**SECTIONS, "renderer": {"samples": 64, "noise": 0.02}}
-    film = clfractal.render(scene_of(**sections), channels=["R", "G", "B", "A", "samples", "CryptoObject"])
-    assert film["samples"].min() < film["samples"].max()
-    parts = sum(film[name] for name in OBJECT_MATTES[1::2])
-    np.testing.assert_allclose(parts, film["A"], atol=1e-6)
+    framebuffer = clfractal.render(
+        scene_of(**sections), channels=["R", "G", "B", "A", "samples", "CryptoObject"]
+    )
+    assert framebuffer["samples"].min() < framebuffer["samples"].max()
+    parts = sum(framebuffer[name] for name in CRYPTOMATTE_OBJECTS[1::2])
+    np.testing.assert_allclose(parts, framebuffer["A"], atol=1e-6)
 
 
 @pytest.mark.parametrize("lighting", [{}, path(1)])
 def test_lights_that_are_seen_are_nothing(lighting: dict[str, Any]) -> None:
     lamp = {"type": "sphere", "position": [0, -2.5, 0], "radius": 0.15}
-    film = clfractal.render(
+    framebuffer = clfractal.render(
         scene_of(lights=[lamp], lighting=lighting), channels=["A", "object", "CryptoObject"]
     )
-    assert film["A"][24, 24] == 1
-    assert film["object"][24, 24] == 0
-    assert film["CryptoObject00.G"][24, 24] == 0
-    assert film["object"][24, 32] == 1
+    assert framebuffer["A"][24, 24] == 1
+    assert framebuffer["object"][24, 24] == 0
+    assert framebuffer["CryptoObject00.G"][24, 24] == 0
+    assert framebuffer["object"][24, 32] == 1
 
 
 def test_files_follow_the_specification(tmp_path: Path) -> None:
     scene = scene_of(**SECTIONS)
-    film = clfractal.render(scene, channels=["R", "G", "B", "A", *NUMBERED, "CryptoObject", "CryptoMaterial"])
-    film.save(tmp_path / "a.exr")
+    framebuffer = clfractal.render(
+        scene, channels=["R", "G", "B", "A", *NUMBERED, "CryptoObject", "CryptoMaterial"]
+    )
+    framebuffer.save(tmp_path / "a.exr")
     planes, header = read_exr(tmp_path / "a.exr")
-    assert {planes[name].dtype for name in OBJECT_MATTES} == {np.dtype(np.float32)}
+    assert {planes[name].dtype for name in CRYPTOMATTE_OBJECTS} == {np.dtype(np.float32)}
     assert header["clfractalObjects"] == ("set", *OBJECTS)
     assert header["clfractalMaterials"] == ("red", "blue", "material")
     for layer, names in (
@@ -148,8 +154,8 @@ def test_files_follow_the_specification(tmp_path: Path) -> None:
         assert list(manifest) == names
         for name, told in manifest.items():
             assert np.uint32(int(told, 16)).view(np.float32) == np.float32(identifier(name))
-    np.testing.assert_array_equal(planes["CryptoObject00.R"], film["CryptoObject00.R"])
-    film.save(tmp_path / "a.png")
+    np.testing.assert_array_equal(planes["CryptoObject00.R"], framebuffer["CryptoObject00.R"])
+    framebuffer.save(tmp_path / "a.png")
     assert b"cryptomatte" not in (tmp_path / "a.png").read_bytes()
 
 
@@ -191,7 +197,7 @@ def test_pictures_without_them_keep_nothing_for_them(device: Device) -> None:
         plan_of(scene, device, channels=names) for names in (("R", "A"), ("R", "A", "object"))
     )
     assert program_texts(scene, without) == program_texts(scene, with_them)
-    assert state_numbers(scene, without) + carried.MATTES.numbers == state_numbers(scene, with_them)
+    assert state_numbers(scene, without) + path_state.CRYPTOMATTE.numbers == state_numbers(scene, with_them)
 
 
 @pytest.mark.parametrize(
@@ -217,7 +223,7 @@ def test_half_is_refused() -> None:
 def test_layers_in_scene_files() -> None:
     text = "version: 1\nformula: {name: hast}\ncamera: {}\noutput:\n  channels: [R, CryptoObject, N]\n"
     scene = clfractal.load_scene(text)
-    assert scene.output.channels == ("R", *OBJECT_MATTES, "N.X", "N.Y", "N.Z")
+    assert scene.output.channels == ("R", *CRYPTOMATTE_OBJECTS, "N.X", "N.Y", "N.Z")
     with pytest.raises(SceneError, match=r"channel 'N.Y' is given twice") as caught:
         clfractal.load_scene(text.replace("N]", "N, N.Y]"))
     assert caught.value.where.line == 5

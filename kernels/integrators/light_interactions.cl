@@ -1,25 +1,25 @@
-// Entry point: the light of spots by Phong's model. It knows no formula.
+// Entry point: the light of interactions by Phong's model. It knows no formula.
 #include "integrators/stages.h"
 #include "shading/environment.h"
 #include "shading/sky.h"
 #include "shading/phase.h"
-#include "integrators/spot.h"
+#include "integrators/interaction.h"
 #include "integrators/secondary.h"
 #include "shading/fog.h"
-#include "shading/look.h"
+#include "shading/phong_material.h"
 #include "integrators/lit.h"
-#include "integrators/shots.h"
+#include "integrators/pixel_samples.h"
 
-// Gathers the light of the spots. Where the path ends here, its shot ends too; else its mirrored ray is sent.
-STAGE(light_spots) {
+// Gathers the light of the interactions. Where the path ends here, its sample ends too; else its mirrored ray is sent.
+STAGE(light_interactions) {
     STAGE_BEGINS(s, w);
     const camera_sample a = camera_sample_kept(s);
-    spot found = spot_kept(s, bounce);
+    interaction found = interaction_kept(s, bounce);
     STATE_KEPT(s, counters, cost, STATE_COUNTERS);
     path so_far;
     const ray arrived = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
     const vec direction = arrived.direction;
-    if (KEEPS(s, STATE_LAMP_BEFORE)) path_ends_at_light(s, &so_far);
+    if (KEEPS(s, STATE_LIGHT_BEFORE)) path_ends_at_light(s, &so_far);
     color gathered = color_of(R(0.0), R(0.0), R(0.0));
     if (any_lane(mask_of(found.found))) {
         if (!is_colored_at_once(w.material)) found.tint = tint_of(&found, w);
@@ -38,5 +38,5 @@ STAGE(light_spots) {
         path_mirror(s, &so_far, direction, eye_ray(&a, view), a.time, &found, mirrored, w);
         return;
     }
-    end_shots(s, a, so_far.seen, &found, cost, w);
+    end_samples(s, a, so_far.seen, &found, cost, w);
 }

@@ -1,12 +1,12 @@
-// Entry point: spots of what rays have met. It knows no formula.
+// Entry point: interactions of what rays have met. It knows no formula.
 #include "integrators/stages.h"
-#include "integrators/spot_found.h"
+#include "integrators/interaction_found.h"
 #include "shading/phase.h"
 #include "shading/flights.h"
 #include "shading/media.h"
 
-// Makes spots of what the rays along the path have met, and sends the rays that bring their light.
-STAGE(find_spots) {
+// Makes interactions of what the rays along the path have met, and sends the rays that bring their light.
+STAGE(find_interactions) {
     STAGE_BEGINS(s, w);
     if (HAS(w, PATHS) && paths_are_over(s)) return;
     const camera_sample a = camera_sample_kept(s);
@@ -19,10 +19,10 @@ STAGE(find_spots) {
     if (bounce > 0 && HAS(w, GLASS_SET)) seen = met_within(s, r, seen, &object, &place, w);
     counters_met(&cost, seen, 1);
     const sighting at_first = {seen.hit, seen.steps};
-    spot found = spot_of_ray(r, seen, object, place, w);
+    interaction found = interaction_of_ray(r, seen, object, place, w);
     if (bounce > 0 && HAS(w, SUBSURFACE)) {
-        const carried with = carried_kept(s);
+        const path_state with = path_state_kept(s);
         found.normal = vec_pick(path_emerges(bounce, &with, &found, w), vec_scale(found.normal, R(-1.0)), found.normal);
     }
-    spot_found(s, r, so_far.on_path, found, at_first, cost, next_turns, w);
+    interaction_found(s, r, so_far.on_path, found, at_first, cost, next_turns, w);
 }

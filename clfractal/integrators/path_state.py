@@ -1,11 +1,11 @@
-"""What is carried from stage to stage, and summed over shots: structs of reals, each declared here once."""
+"""Structs of reals, each declared here once: the state of paths between stages, and sums over samples."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from typing import Literal
 
-from clfractal.files.channels import MATTE_RANKS
+from clfractal.files.channels import CRYPTOMATTE_RANKS
 
 Kind = Literal["real", "vec", "color"]
 _NUMBERS: dict[Kind, int] = {"real": 1, "vec": 3, "color": 3}
@@ -25,7 +25,7 @@ class Member:
 
 
 @dataclass(frozen=True, slots=True)
-class Carried:
+class StateStruct:
     """Something that is carried, as a struct in C."""
 
     name: str
@@ -47,46 +47,46 @@ class Carried:
         return "\n".join([*lines, f"}} {self.name};", ""])
 
 
-def _carried(name: str, meaning: str, *members: tuple[Kind, str, str]) -> Carried:
-    return Carried(name, meaning, tuple(Member(*member) for member in members))
+def _struct(name: str, meaning: str, *members: tuple[Kind, str, str]) -> StateStruct:
+    return StateStruct(name, meaning, tuple(Member(*member) for member in members))
 
 
-FILM_SAMPLE = _carried(
+FILM_SAMPLE = _struct(
     "film_sample",
-    "Where the shot goes to in the picture.",
+    "Where the sample goes to in the picture.",
     ("real", "wanted", "whether the pixel takes this sample"),
     ("real", "x", "pixels from the picture's left side ..."),
     ("real", "y", "... and from its top"),
     ("real", "offset", "distance squared from the pixel's middle, pixels"),
 )
-LENS_SAMPLE = _carried(
+LENS_SAMPLE = _struct(
     "lens_sample",
-    "Where the shot goes through the lens, and when.",
+    "Where the sample goes through the lens, and when.",
     ("real", "lens_x", "lens radii from its middle"),
     ("real", "lens_y", ""),
     ("real", "time", "while the shutter is open, 0 to 1"),
 )
-SIGHTING = _carried("sighting", "What was found first.", ("real", "coverage", ""), ("real", "steps", ""))
-START = _carried(
+SIGHTING = _struct("sighting", "What was found first.", ("real", "coverage", ""), ("real", "steps", ""))
+START = _struct(
     "start_of_rays",
     "Where the pixel's rays begin: so far its block's cone is free.",
     ("real", "t", "distance along its rays, scene units"),
 )
-TOUCH = _carried(
+TOUCH = _struct(
     "touch",
     "How far the pixel's whole cone is free.",
     ("real", "touched", "whether the set is there"),
     ("real", "t", "distance along its ray, scene units"),
 )
-COUNTERS = _carried(
+COUNTERS = _struct(
     "counters",
     "What rays cost.",
     ("real", "steps", "distance evaluations; of a volume: places looked at"),
     ("real", "count", "applications of the formula"),
     ("real", "bad", "steps that ended inside"),
 )
-SPOT_SEEN = _carried(
-    "spot_seen",
+INTERACTION_SEEN = _struct(
+    "interaction_seen",
     "A place on the surface, and how it looks.",
     ("real", "found", ""),
     ("vec", "point", "where it is shaded, and rays leave it"),
@@ -96,9 +96,9 @@ SPOT_SEEN = _carried(
     ("real", "smooth", "escape count"),
     ("color", "tint", "of the surface"),
 )
-SPOT_THING = _carried(
-    "spot_thing",
-    "Of what thing a spot is, and what chooses its colour.",
+INTERACTION_THING = _struct(
+    "interaction_thing",
+    "Of what thing an interaction is, and what chooses its colour.",
     (
         "real",
         "object",
@@ -109,19 +109,19 @@ SPOT_THING = _carried(
     ("real", "quantity", "what chooses the colour"),
     ("real", "residual", "distance of the pixel's points from their plane, in footprints"),
 )
-FACET = _carried(
+FACET = _struct(
     "facet",
     "One of the normals over which shading is averaged.",
     ("vec", "normal", ""),
     ("real", "weight", ""),
 )
-RELIEF = _carried(
+RELIEF = _struct(
     "relief",
-    "How a spot's relief rises along the surface.",
+    "How an interaction's relief rises along the surface.",
     ("real", "rises", "whether its material has one"),
     ("vec", "slope", ""),
 )
-PATH = _carried(
+PATH = _struct(
     "path",
     "A path after a bounce.",
     ("vec", "origin", ""),
@@ -132,24 +132,24 @@ PATH = _carried(
     ("color", "through", "part of what comes next that reaches the eye"),
     ("color", "seen", "light so far"),
 )
-LAMP_BEFORE = _carried(
-    "lamp_before",
-    "A light that is seen before a spot.",
+LIGHT_BEFORE = _struct(
+    "light_before",
+    "A light that is seen before an interaction.",
     ("real", "met", "whether there is one"),
     ("color", "shows", ""),
 )
-ASKED_LIGHT = _carried(
-    "asked_light",
-    "What a path awaits of the lights at its last spot.",
-    ("color", "awaited", "what one brings, if nothing is in the way of the ray that asks for it"),
+DIRECT_LIGHT = _struct(
+    "direct_light",
+    "What a path awaits of the lights at its last interaction.",
+    ("color", "awaited", "what one brings, if nothing is in the way of its shadow ray"),
     (
         "real",
         "density",
-        "per steradian, of the path's direction; below 0 where lights were not asked for at all",
+        "per steradian, of the path's direction; below 0 where lights were not sampled at all",
     ),
-    ("real", "total", "what all lights weighed at the spot"),
+    ("real", "total", "what all lights weighed at the interaction"),
 )
-WITHIN = _carried(
+WITHIN = _struct(
     "within",
     "The glass that a path is in.",
     ("real", "medium", "by the number of its body, see media.h; 0: the open"),
@@ -157,7 +157,7 @@ WITHIN = _carried(
     ("real", "wave", "the path's place in the spectrum; below 0 while it has all colours"),
     ("color", "extinction", "what the medium absorbs and scatters, per unit of the way"),
 )
-FLIGHT = _carried(
+FLIGHT = _struct(
     "flight",
     "The flight of a path through what scatters light.",
     ("color", "scatters", "the part of the extinction that is scattered"),
@@ -167,40 +167,44 @@ FLIGHT = _carried(
     ("real", "seed_high", "... of which this is the higher one"),
 )
 
-HALT = _carried(
+HALT = _struct(
     "halt",
     "Where a medium has scattered a path before what it had met.",
     ("real", "halted", "which kind of medium has, see state.h; or 0"),
     ("real", "anisotropy", "of a cloud, Henyey and Greenstein's g"),
-    ("real", "far", "after spots: how far the ray goes that asks for light; below 0: there is none"),
+    ("real", "far", "after interactions: how far the shadow ray goes; below 0: there is none"),
 )
 
 
-def _whole(name: str, meaning: str, *slices: Carried) -> Carried:
-    return Carried(name, meaning, tuple(member for each in slices for member in each.members))
+def _whole(name: str, meaning: str, *slices: StateStruct) -> StateStruct:
+    return StateStruct(name, meaning, tuple(member for each in slices for member in each.members))
 
 
 # Things of slices, of which a scene may not need the last ones.
-CAMERA_SAMPLE = _whole("camera_sample", "Where the shot goes to.", FILM_SAMPLE, LENS_SAMPLE)
-SPOT = _whole("spot", "A place on the surface.", SPOT_SEEN, SPOT_THING)
-CARRIED = _whole(
-    "carried", "What a path of light carries from a spot to the next.", ASKED_LIGHT, WITHIN, FLIGHT
+CAMERA_SAMPLE = _whole("camera_sample", "Where the sample goes to.", FILM_SAMPLE, LENS_SAMPLE)
+INTERACTION = _whole("interaction", "A place on the surface.", INTERACTION_SEEN, INTERACTION_THING)
+PATH_STATE = _whole(
+    "path_state",
+    "What a path of light carries from an interaction to the next.",
+    DIRECT_LIGHT,
+    WITHIN,
+    FLIGHT,
 )
 SLICES = {
     CAMERA_SAMPLE: (FILM_SAMPLE, LENS_SAMPLE),
-    SPOT: (SPOT_SEEN, SPOT_THING),
-    CARRIED: (ASKED_LIGHT, WITHIN, FLIGHT),
+    INTERACTION: (INTERACTION_SEEN, INTERACTION_THING),
+    PATH_STATE: (DIRECT_LIGHT, WITHIN, FLIGHT),
 }
-FACE = _carried(
+FACE = _struct(
     "plane_face",
-    "Where a plane opens the set on the way to the next spot.",
+    "Where a plane opens the set on the way to the next interaction.",
     ("real", "number", "as a thing, or 0"),
     ("real", "t", "distance along the ray, scene units"),
     ("real", "count", "escape count"),
     ("color", "tint", ""),
     ("vec", "normal", ""),
 )
-LAYERS = _carried(
+LAYERS = _struct(
     "plane_layers",
     "What planes add to a picture. In front of the object: light, and the part that comes through; behind it the same.",
     ("color", "front", ""),
@@ -216,34 +220,33 @@ LAYERS = _carried(
     ("vec", "point", ""),
     ("real", "count", "escape count"),
 )
-AOVS = _carried(
+AOVS = _struct(
     "aovs",
-    "What a shot knows of its layers before its end.",
+    "What a sample knows of its layers before its end.",
     ("color", "albedo", "of the first surface"),
     ("color", "emission", "what the path had seen before any light was reflected ..."),
     ("color", "once", "... and before any was reflected twice"),
     ("vec", "normal", "by which the first surface has scattered light"),
 )
-# Sums over a pixel's shots.
-PIXEL = _carried(
+PIXEL = _struct(
     "pixel",
-    "Sums over the shots of a pixel, and what the one nearest to its middle found.",
+    "Sums over the samples of a pixel, and what the one nearest to its middle found.",
     ("color", "radiance", ""),
     ("real", "coverage", ""),
-    ("real", "shots", ""),
-    ("real", "brightness", "of each shot, for its noise ..."),
+    ("real", "samples", ""),
+    ("real", "brightness", "of each sample, for its noise ..."),
     ("real", "brightness_square", ""),
     ("real", "coverage_square", ""),
-    ("real", "nearest", "distance squared of the kept shot from the middle, pixels"),
+    ("real", "nearest", "distance squared of the kept sample from the middle, pixels"),
     ("real", "depth", "along the view axis, scene units"),
     ("vec", "normal", ""),
     ("vec", "point", ""),
     ("real", "smooth", "escape count"),
     ("real", "steps", "evaluations"),
 )
-PARTS_OF_LIGHT = _carried(
+PARTS_OF_LIGHT = _struct(
     "parts",
-    "What a shot knows of the first surface, and of its light by how often that was reflected; or sums over shots."
+    "What a sample knows of the first surface, and of its light by how often that was reflected; or sums over samples."
     " Normals count as much as they cover.",
     ("color", "albedo", ""),
     ("color", "emission", ""),
@@ -251,15 +254,15 @@ PARTS_OF_LIGHT = _carried(
     ("color", "indirect", ""),
     ("vec", "normal", ""),
 )
-MATTES = Carried(
-    "mattes",
+CRYPTOMATTE = StateStruct(
+    "cryptomatte",
     "Which things a pixel shows. Things that come when all ranks are taken are not noted.",
     (
         Member(
             "real",
             "pairs",
             "of each rank a number from 1, or 0: none; the sum of what it covers",
-            2 * MATTE_RANKS,
+            2 * CRYPTOMATTE_RANKS,
         ),
         Member("real", "nearest", "the number nearest to the pixel's middle"),
     ),
@@ -268,25 +271,25 @@ TYPES = (
     COUNTERS,
     PIXEL,
     PARTS_OF_LIGHT,
-    MATTES,
+    CRYPTOMATTE,
     CAMERA_SAMPLE,
     SIGHTING,
     START,
     TOUCH,
-    SPOT,
+    INTERACTION,
     FACET,
     RELIEF,
     PATH,
-    CARRIED,
+    PATH_STATE,
     HALT,
-    LAMP_BEFORE,
+    LIGHT_BEFORE,
     FACE,
     LAYERS,
     AOVS,
 )
 
 
-def carried_text() -> str:
+def path_state_text() -> str:
     """The declarations of TYPES in C, for inclusion after `vectors.h`."""
     slices: list[str] = []
     for whole, each in SLICES.items():

@@ -41,7 +41,7 @@ class Drawn:
     picture: Callable[[], Any]
 
 
-class Shots:
+class Screenshots:
     """Writes what was drawn before it is shown.
 
     Args:
@@ -71,7 +71,7 @@ class Shots:
         wanted, self._next = self._next, []
         for target, panels in wanted:
             try:
-                write_shot(target, drawn.whole() if panels else drawn.picture(), studio.shown_scene)
+                write_screenshot(target, drawn.whole() if panels else drawn.picture(), studio.shown_scene)
                 studio.tell(f"saved {_shown(target)}")
             except ClfractalError as error:
                 studio.tell(str(error), wrong=True)
@@ -90,7 +90,7 @@ class Shots:
         self._ready += 1
         if self._ready < _STILL_FRAMES:
             return True
-        write_shot(target, drawn.whole(), studio.shown_scene)
+        write_screenshot(target, drawn.whole(), studio.shown_scene)
         self.finished = True
         return False
 
@@ -110,7 +110,7 @@ def free_name(source: SceneSource, ending: str, taken: list[Path] | None = None)
         number += 1
 
 
-def write_shot(target: Path, pixels: Any, scene: Scene) -> None:
+def write_screenshot(target: Path, pixels: Any, scene: Scene) -> None:
     """Writes a screenshot, uint8 of shape (height, width, 3); it holds the scene, so that it can be opened again.
 
     Raises:

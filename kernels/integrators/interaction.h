@@ -1,16 +1,16 @@
-// Spots of the surface, of what marches have met.
+// Interactions of the surface, of what marches have met.
 
-// Normals of a spot: only the first one, and that of pixels with points, may have several.
+// Normals of an interaction: only the first one, and that of pixels with points, may have several.
 INLINE int facet_count(int bounce, world w) { return bounce == 0 ? w.settings->normal_count : 1; }
 
-INLINE facet facet_of(stage s, const spot *here, int i, world w) {
+INLINE facet facet_of(stage s, const interaction *here, int i, world w) {
     facet f = {here->normal, R(1.0)};
     if (facet_count(s.bounce, w) > 1) STATE_RECALL_ONE(s, f, STATE_FACET, i);
     return f;
 }
 
-// Whether any normal of the spot faces that way. (With the mean normal only, a rough spot's other normals would have no shadow.)
-INLINE mask faces(stage s, const spot *here, vec direction, world w) {
+// Whether any normal of the interaction faces that way. (With the mean normal only, a rough interaction's other normals would have no shadow.)
+INLINE mask faces(stage s, const interaction *here, vec direction, world w) {
     mask any_normal = less(R(1.0), R(0.0));
     for (int i = 0; i < facet_count(s.bounce, w); ++i) {
         const facet f = facet_of(s, here, i, w);
@@ -32,20 +32,21 @@ INLINE color object_color(vec normal, real quantity, real object, world w) {
     return found;
 }
 
-// The colour of a spot: where two solids flow together, a blend of theirs.
-INLINE color spot_color(vec normal, real quantity, real object, real other, real share, world w) {
+// The colour of an interaction: where two solids flow together, a blend of theirs.
+INLINE color interaction_color(vec normal, real quantity, real object, real other, real share, world w) {
     const color own = object_color(normal, quantity, object, w);
     if (any_lane(less(R(0.0), share))) return color_mix(own, object_color(normal, quantity, other, w), share);
     return own;
 }
 
 // The same once its quantity is known. Faces have their colour already.
-INLINE color tint_of(const spot *here, world w) {
-    const color found = spot_color(here->normal, here->quantity, here->object, here->other, here->share, w);
+INLINE color tint_of(const interaction *here, world w) {
+    const color found = interaction_color(here->normal, here->quantity, here->object, here->other, here->share, w);
     return color_pick(on_face(here), here->tint, found);
 }
 
-// What a ray for a spot has met: the set, or the object with this number, or the face of an object's cut; and the place where it is shaded.
+// What a ray for an interaction has met: the set, or the object with this number, or the face of an object's cut; and the place where it is
+// shaded.
 INLINE ray_hit surface_met(stage s, int turn, ray r, real *object, vec *place, world w) {
     const ray_hit met = queue_met(s.q, turn, s.slot);
     *place = vec_along(r.origin, met.touch, r.direction);
@@ -65,9 +66,9 @@ INLINE ray_hit surface_met(stage s, int turn, ray r, real *object, vec *place, w
 
 INLINE real largest_of(vec a) { return fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z)); }
 
-// How far over a spot rays leave it: far enough from the set not to meet the very bump that they start from. An object has none, nor
+// How far over an interaction rays leave it: far enough from the set not to meet the very bump that they start from. An object has none, nor
 // has a face: from those rays leave as near as numbers are sure to be on the right side (Pharr, Jakob, Humphreys 2023, sec. 6.8).
-INLINE real lift_of(const spot *here, world w) {
+INLINE real lift_of(const interaction *here, world w) {
     real lift = here->cone * (real)(w.settings->shadow_lift);
     if (w.settings->object_count + w.planes.count == 0) return lift;
     const real own = largest_of(here->point), each = LIFT_ERRORS * (real)(REAL_EPSILON);
@@ -84,9 +85,9 @@ INLINE real lift_of(const spot *here, world w) {
     return lift;
 }
 
-// The spot where one ray has met the surface.
-INLINE spot spot_of_ray(ray r, ray_hit met, real object, vec place, world w) {
-    spot here;
+// The interaction where one ray has met the surface.
+INLINE interaction interaction_of_ray(ray r, ray_hit met, real object, vec place, world w) {
+    interaction here;
     here.found = met.hit;
     here.point = place;
     here.seen = vec_along(r.origin, met.t, r.direction);
@@ -95,15 +96,15 @@ INLINE spot spot_of_ray(ray r, ray_hit met, real object, vec place, world w) {
     here.smooth = met.smooth;
     here.residual = R(0.0);
     here.quantity = R(0.0);
-    here.tint = spot_color(met.normal, met.smooth, object, met.other, met.part, w);
+    here.tint = interaction_color(met.normal, met.smooth, object, met.other, met.part, w);
     here.object = object;
     here.other = met.other;
     here.share = met.part;
     return here;
 }
 
-// Where the ray for a spot meets a face of the set before all else, that is the spot: such lanes are the result.
-INLINE mask spot_on_face(stage s, ray r, spot *here, world w) {
+// Where the ray for an interaction meets a face of the set before all else, that is the interaction: such lanes are the result.
+INLINE mask interaction_on_face(stage s, ray r, interaction *here, world w) {
     STATE_KEPT(s, plane_face, face, STATE_FACE);
     const mask bare = less(R(0.0), face.number);
     if (!any_lane(bare)) return bare;
@@ -136,7 +137,8 @@ INLINE ray_hit met_within(stage s, ray r, ray_hit met, real *object, vec *place,
     return met;
 }
 
-// The normal of a spot that a path sees: past a rim that of the set faces away, and what sees a surface from behind would have no light.
+// The normal of an interaction that a path sees: past a rim that of the set faces away, and what sees a surface from behind would have no
+// light.
 INLINE vec facing(vec normal, vec direction) { return vec_along(normal, R(-2.0) * fmax(vec_dot(normal, direction), R(0.0)), direction); }
 
 // What a march has cost, and where `of_surface` what finding its normal has.

@@ -1,49 +1,49 @@
-// Entry point that knows the formula: what chooses the colour of spots, where that asks the formula.
+// Entry point that knows the formula: what chooses the colour of interactions, where that asks the formula.
 #include "formulas/orbits.h"
 #include "integrators/stages.h"
 #include "shading/coloring.h"
 #include "shading/asked.h"
 #include "shading/bump_places.h"
 
-// Keeps what the formula answers at spots, or at a place around them. On objects beside the set it has an answer for traps only.
-INLINE void answers_keep(stage s, const spot *there, int place, mask asks, mask of_set, material_record questions,
+// Keeps what the formula answers at interactions, or at a place around them. On objects beside the set it has an answer for traps only.
+INLINE void answers_keep(stage s, const interaction *there, int place, mask asks, mask of_set, material_record questions,
                          orbit_record orbit, constants k, world w) {
     // After the scene's own record.
-    const int count = place == AT_SPOT ? w.settings->asked_count : w.settings->bump_asked;
+    const int count = place == AT_INTERACTION ? w.settings->asked_count : w.settings->bump_asked;
     for (int i = 0; i < count; ++i) {
         material_record m = questions + i;
         const mask answered = m->asks == MAP_TRAP ? asks : of_set;
         const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
         lanes_store(answer, asked_at(s, place, i, w));
     }
-    if (place == AT_SPOT || !w.settings->bump_surface) return;
+    if (place == AT_INTERACTION || !w.settings->bump_surface) return;
     surface_point surface;
     const clearance here = orbit_dual_distance(there->point, of_set, OF_SURFACE, orbit, k, &surface);
     const vec normal = vec_normalize(surface.gradient);
-    // Where there is none, as at the spot.
+    // Where there is none, as at the interaction.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | here.end.inside;
     const vec known = vec_pick(flat, there->normal, normal);
     const real numbers[4] = {known.x, known.y, known.z, smooth_count(here.end, surface, orbit)};
     KEEP_NUMBERS(numbers, 4, surface_beside_at(s, place, w), s.stride);
 }
 
-STAGE(color_spots) {
+STAGE(color_interactions) {
     STAGE_BEGINS(s, w);
-    spot here = spot_kept(s, bounce);
+    interaction here = interaction_kept(s, bounce);
     const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
     if (!any_lane(settings->asked_count > 0 ? seen : found)) return;
     path so_far;
     const camera_sample a = camera_sample_kept(s);
     const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
-    spot there = here;
+    interaction there = here;
     const real width = HAS(w, BUMP) ? bump_width(&here, w) : R(-1.0);
     const mask rises = less(R(0.0), width);
     const int around = any_lane(seen & rises) ? BUMP_PLACES : 0;
-    // At the spot, then around it.
-    for (int place = AT_SPOT; place < around; ++place) {
+    // At the interaction, then around it.
+    for (int place = AT_INTERACTION; place < around; ++place) {
         mask asks = seen;
-        if (place != AT_SPOT) {
-            there = bump_spot(&here, width, place);
+        if (place != AT_INTERACTION) {
+            there = bump_interaction(&here, width, place);
             asks &= rises;
         }
         answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k, w);
@@ -51,5 +51,5 @@ STAGE(color_spots) {
     if (material->coloring <= COLORING_RESIDUAL) return;
     here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
                                       material, orbit, k);
-    spot_keep(s, &here, bounce);
+    interaction_keep(s, &here, bounce);
 }

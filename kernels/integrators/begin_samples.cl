@@ -1,4 +1,4 @@
-// Entry points: where shots begin. They know no formula.
+// Entry points: where samples begin. They know no formula.
 #include "integrators/stages.h"
 #include "integrators/march/cones.h"
 
@@ -11,7 +11,7 @@ STAGE(send_cones) {
 }
 
 // Sends the rays from the eye. With several points to the pixel the ray only finds out how far the pixel's whole cone is free.
-STAGE(begin_shots) {
+STAGE(begin_samples) {
     STAGE_BEGINS(s, w);
     const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
     const pixel p = sums_before(s, &here);

@@ -1,9 +1,9 @@
-// How paths ask lights, whatever they leave: a surface or a place in a medium. What a path could also have met by chance is weighed by the
+// How paths sample lights, whatever they leave: a surface or a place in a medium. What a path could also have met by chance is weighed by the
 // power heuristic (Veach and Guibas 1995).
 
 // Lights beside those that are listed: what they add to the sum of all weights, and the one of them that is chosen, if one is.
 INLINE real with_lights_beside(real sum, vec point, real own, world w);
-INLINE void lights_beside_asked(choosing *c, const real *numbers, world w);
+INLINE void sample_lights_beside(choosing *c, const real *numbers, world w);
 
 // What could light a point from everywhere: the sum over the lights, and the environment. `own`: the object whose surface it is, or 0; no
 // object lights itself.
@@ -19,8 +19,8 @@ INLINE real weight_of_all(vec point, real own, world w) {
 INLINE color light_past(vec direction, real picture_y, vec from, real density, real total, world w) {
     color sum = sky(direction, picture_y, 1, w);
     if (has_environment(w.material)) {
-        const real asked = (real)(w.settings->environment_weight) / total * environment_density(direction, w.material, w.environment);
-        sum = color_scale(sum, pick(less(density, R(0.0)), R(1.0), power_share(density, asked)));
+        const real of_choice = (real)(w.settings->environment_weight) / total * environment_density(direction, w.material, w.environment);
+        sum = color_scale(sum, pick(less(density, R(0.0)), R(1.0), power_share(density, of_choice)));
     }
     for (int i = 0; i < w.settings->light_count; ++i) {
         const mask met = light_met(w.lights + i, direction);
@@ -34,7 +34,7 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
 
 // One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium, and
 // `own` as above.
-INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
+INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
     const real u = numbers[0], v = numbers[1], choice = numbers[2];
     const mask all = less(R(0.0), R(1.0));
     const light_ray none = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
@@ -58,16 +58,16 @@ INLINE asked light_asked(vec point, vec from, vec normal, real own, const real *
         if (!is_light || light_is_met(light) || light_is_seen(light)) c.found.both |= here;
         if (is_light && !light->shadow) c.found.unblocked |= here;
     }
-    lights_beside_asked(&c, numbers, w);
+    sample_lights_beside(&c, numbers, w);
     // Lights hide what is behind them.
     real far = c.found.ray.distance * R(0.999);
-    const lamp hides = lamp_met(c.begin, c.found.ray.toward, 0, &far, w);
+    const light_hit hides = light_hit_of(c.begin, c.found.ray.toward, 0, &far, w);
     c.found.ray.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), c.found.ray.light);
     return c.found;
 }
 
-// The weight of the light that was asked for; `other`: with which density the path itself chooses this direction.
-INLINE real asked_weight(const asked *a, real other) {
+// The weight of the light that was sampled; `other`: with which density the path itself chooses this direction.
+INLINE real sampled_light_weight(const sampled_light *a, real other) {
     // A light of one direction is never met by chance.
     const mask has_size = less(R(0.0), a->ray.density);
     const real density = a->share * a->ray.density;
@@ -75,13 +75,13 @@ INLINE real asked_weight(const asked *a, real other) {
 }
 
 // What it brings if nothing is in its way, where an event scatters light from there with that value and density.
-INLINE color asked_brings(const asked *a, color value, real density) {
-    return color_scale(color_mul(value, a->ray.light), asked_weight(a, density));
+INLINE color sampled_light_brings(const sampled_light *a, color value, real density) {
+    return color_scale(color_mul(value, a->ray.light), sampled_light_weight(a, density));
 }
 
-// What a path sees at its end that has chosen its direction with `density` where all lights weighed `total`: a lamp, or what is past all.
-INLINE color light_at_end(vec origin, vec direction, const lamp *before, real picture_y, real density, real total, world w) {
-    const real asked = before->weight / total * before->density;
-    const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, asked));
+// What a path sees at its end that has chosen its direction with `density` where all lights weighed `total`: a light, or what is past all.
+INLINE color light_at_end(vec origin, vec direction, const light_hit *before, real picture_y, real density, real total, world w) {
+    const real of_choice = before->weight / total * before->density;
+    const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, of_choice));
     return color_pick(before->met, color_scale(before->shows, share), light_past(direction, picture_y, origin, density, total, w));
 }
