@@ -1,4 +1,4 @@
-"""Makes the tables of keys in docs/*.md of what the schema declares, and the sections of shapes in docs/objects.md.
+"""Makes the tables of keys in docs/*.md of what the schema declares, and the sections of kinds of shapes and lights.
 
 python docs/make_reference.py
 
@@ -18,12 +18,13 @@ from typing import Any
 
 from clfractal.scene.load import schema
 from clfractal.schema.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
+from clfractal.schema.kinds import members
 from clfractal.schema.shape import solids
 
 DOCS = Path(__file__).resolve().parent
 HEAD = "| key | default | allowed | meaning |\n|---|---|---|---|\n"
 _TABLE = re.compile(r"^<!-- keys of (\w+) -->\n\n(?:\|.*\n)*", re.MULTILINE)
-_SHAPES = re.compile(r"(?<=<!-- solids -->\n).*(?=<!-- end of solids -->)", re.DOTALL)
+_KINDS = re.compile(r"(?<=<!-- )(solids|lights)( -->\n).*(?=<!-- end of \1 -->)", re.DOTALL)
 # Words of descriptions as pages write them.
 _LINKS = {
     "`materials`": "[`materials`](paths.md#materials)",
@@ -35,7 +36,7 @@ _LINKS = {
 def made(page: str) -> str:
     """A page's text with the tables and sections that the schema says."""
     found = _TABLE.sub(lambda table: _table(table[1], table[0]), page)
-    return _SHAPES.sub(lambda _: "\n" + "".join(_sections()), found)
+    return _KINDS.sub(lambda block: f"{block[1]}{block[2]}\n" + "".join(_sections(block[1], block[0])), found)
 
 
 def sections_of(page: str) -> list[str]:
@@ -72,14 +73,18 @@ def _rows(name: str) -> Iterator[tuple[str, str, str, str]]:
         yield f"`{key}`", _default(entry, key, found.get("required", [])), _allowed(entry), meaning
 
 
-def _sections() -> Iterator[str]:
-    """Of each solid what its class says, its picture, and its keys."""
-    for kind in solids():
+def _sections(family: str, before: str) -> Iterator[str]:
+    """Of each kind what its class says, its picture, and its keys, as the tables before tell them."""
+    tables = {table[1]: table[0] for table in _TABLE.finditer(before)}
+    folder, prefix, found = (
+        ("objects", "", solids()) if family == "solids" else (family, f"{family}, ", members(family))
+    )
+    for kind in found:
         about = " ".join((inspect.getdoc(kind) or "").split())
-        yield f"## {kind.tag}\n\n{about}\n\n"
-        if (DOCS / "pictures" / f"objects_{kind.tag}.webp").exists():
-            yield f"![{about}](pictures/objects_{kind.tag}.webp)\n\n"
-        yield _table(kind.__name__) + "\n"
+        yield f"## {prefix}{kind.tag}\n\n{about}\n\n"
+        if (DOCS / "pictures" / f"{folder}_{kind.tag}.webp").exists():
+            yield f"![{about}](pictures/{folder}_{kind.tag}.webp)\n\n"
+        yield _table(kind.__name__, tables.get(kind.__name__, "")) + "\n"
 
 
 @cache

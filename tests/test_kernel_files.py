@@ -8,7 +8,9 @@ from collections.abc import Iterator
 from clfractal.device.orbit import SHAPE_KINDS
 from clfractal.device.source import kinds
 from clfractal.files.resources import folder
+from clfractal.integrators.lights import LIGHT_KINDS
 from clfractal.schema.kinds import members
+from clfractal.schema.light import SingleLight
 from clfractal.schema.shape import solids
 
 MOST_LINES = 80
@@ -47,15 +49,26 @@ def test_functions_are_counted() -> None:
 
 def test_each_shape_is_a_file_with_all_functions() -> None:
     """Shapes of scenes and of kernels are the same, and each has what is asked of it; solids, what paths ask for too."""
-    kernels = folder("kernels")
     assert SHAPE_KINDS.keys() == {kind.tag for kind in members("shapes")}
     assert kinds("elements/shapes/emitters").keys() == {kind.tag for kind in solids()}
-    for interface, family, count in (
-        ("geometry/shapes.h", "elements/shapes", 5),
-        ("shading/emitter_places.h", "elements/shapes/emitters", 2),
-    ):
-        asked = re.findall(r"^//   \w+ NAME_(\w+)\(", (kernels / interface).read_text("utf-8"), re.MULTILINE)
-        assert len(asked) == count
-        for name in kinds(family):
-            found = dict(functions((kernels / family / f"{name}.h").read_text("utf-8")))
-            assert {f"{name}_{function}" for function in asked} <= set(found)
+    check_functions("geometry/shapes.h", "elements/shapes", 5)
+    check_functions("shading/emitter_places.h", "elements/shapes/emitters", 2)
+
+
+def test_each_light_is_a_file_with_all_functions() -> None:
+    """Lights with records, of scenes and of kernels; those that rays can meet have all that is asked of these."""
+    single = [kind for kind in members("lights") if issubclass(kind, SingleLight)]
+    assert LIGHT_KINDS.keys() == {kind.tag for kind in single}
+    assert kinds("elements/lights/area_lights").keys() == {kind.tag for kind in single if kind.is_seen}
+    check_functions("shading/light_at.h", "elements/lights", 1)
+    check_functions("shading/light_places.h", "elements/lights/area_lights", 4)
+
+
+def check_functions(interface: str, family: str, count: int) -> None:
+    """Each kind of a family has the functions that its interface says."""
+    kernels = folder("kernels")
+    asked = re.findall(r"^//   \w+ NAME_(\w+)\(", (kernels / interface).read_text("utf-8"), re.MULTILINE)
+    assert len(asked) == count
+    for name in kinds(family):
+        found = dict(functions((kernels / family / f"{name}.h").read_text("utf-8")))
+        assert {f"{name}_{function}" for function in asked} <= set(found)

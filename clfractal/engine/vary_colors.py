@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.engine.varied import Step, is_locked, rounded, signed
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, EscapeColors
 from clfractal.scene.layout import LayoutView
-from clfractal.scene.lighting import DirectionalLight
 from clfractal.scene.model import Scene
 from clfractal.scene.palettes import PALETTES, from_oklab, to_oklab
 from clfractal.scene.parts import Gradient

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,23 +17,13 @@ from clfractal.integrators.plan import Plan
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import (
-    DirectionalLight,
-    PlacedLight,
-    PointLight,
-    RectangleLight,
-    SmallLight,
-    SphereLight,
-    SpotLight,
-)
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient, Image
 from clfractal.schema.base import unit
 from clfractal.schema.mapped import QUANTITIES, Map
 from clfractal.shading.environment import PackedEnvironment, material_fields
-from clfractal.shading.kind_numbers import ALONG, COLORINGS, LIGHT_KINDS, TRAPS
+from clfractal.shading.kind_numbers import ALONG, COLORINGS, TRAPS
 from clfractal.shading.maps import asked_maps
-from clfractal.shading.set_lights import SingleLight, single_lights
 
 VIEW = Struct(
     "View",
@@ -58,35 +48,6 @@ VIEW = Struct(
         Field("region_top", "int", 0, "first row to render"),
         Field("region_right", "int", 0, "first column right of the region"),
         Field("region_bottom", "int", 0, "first row below the region"),
-    ],
-)
-
-LIGHT = Struct(
-    "Light",
-    [
-        Field(
-            "vector",
-            "real",
-            3,
-            "directional: where the light travels to, length 1; point: its place, scene units",
-        ),
-        Field("color", "real", 3, "linear Rec. 709"),
-        Field("intensity", "real", 0, "factor on the colour"),
-        Field("kind", "int", 0, "LIGHT_"),
-        Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
-        Field("shadow", "int", 0, "1: blocked by the set"),
-        Field("spread", "real", 0, "1 - cos of half its angular size"),
-        Field("rays", "int", 0, "shadow rays of a sample"),
-        Field("share", "real", 0, "one over that"),
-        Field("axis", "real", 3, "of a spot's cone or a rectangle's shining side, length 1"),
-        Field("side", "real", 3, "a rectangle's middle to its right rim, scene units"),
-        Field("upward", "real", 3, "the same, to its upper rim"),
-        Field("radius", "real", 0, "of a sphere, scene units"),
-        Field("area", "real", 0, "of a rectangle, square scene units"),
-        Field(
-            "rim", "real", 2, "of a spot: half angles where it is dark, and where it begins to fade, radians"
-        ),
-        Field("visible", "int", 0, "1: the eye sees it"),
     ],
 )
 
@@ -206,11 +167,6 @@ def bounces(scene: Scene) -> int:
     return scene.surface.bounces if scene.material.reflection > 0 or mirrors(scene) else 0
 
 
-def light_rays(scene: Scene) -> int:
-    """Most shadow rays of a sample that a light has."""
-    return max((light.used_rays for light in single_lights(scene)), default=1)
-
-
 @dataclass(frozen=True, slots=True)
 class HemisphereRays:
     """Rays of a sample into the hemisphere: spread like the cosine, like the environment's light, and whether that
@@ -230,51 +186,6 @@ def hemisphere_rays(scene: Scene) -> HemisphereRays:
     open_rays = occlusion.rays if occlusion is not None else 0
     lit_rays = scene.environment.rays if scene.environment is not None else 0
     return HemisphereRays(max(open_rays, (lit_rays + 1) // 2), lit_rays // 2, lit_rays > 0)
-
-
-def _light_row(light: SingleLight) -> Mapping[str, object]:
-    placed = isinstance(light, PlacedLight)
-    vector = np.array(light.position if isinstance(light, PlacedLight) else light.direction, float)
-    row: dict[str, object] = {
-        "vector": vector if placed else vector / np.linalg.norm(vector),
-        "color": light.used_color,
-        "intensity": light.intensity,
-        "kind": LIGHT_KINDS[light.type],
-        "inverse_square": int(
-            isinstance(light, PointLight | SpotLight) and light.falloff == "inverse_square"
-        ),
-        "shadow": int(light.shadow),
-        "rays": light.used_rays,
-        "share": 1 / light.used_rays,
-        "spread": 0.0,
-        "axis": (0.0, 0.0, 0.0),
-        "side": (0.0, 0.0, 0.0),
-        "upward": (0.0, 0.0, 0.0),
-        "radius": 0.0,
-        "area": 0.0,
-        "rim": (0.0, 0.0),
-        "visible": 0,
-    }
-    if isinstance(light, SmallLight):
-        # 1 - cos a = 2 sin(a/2)^2, which keeps its digits for the smallest lights.
-        row["spread"] = 2 * math.sin(math.radians(light.angular_size) / 4) ** 2
-    if isinstance(light, SpotLight):
-        half = math.radians(light.angle) / 2
-        row["axis"] = unit(light.direction)
-        row["rim"] = (half, half * (1 - light.softness))
-    elif isinstance(light, SphereLight):
-        row.update(radius=light.radius, visible=int(light.visible))
-    elif isinstance(light, RectangleLight):
-        side, upward = (np.array(way) for way in light.frame)
-        row.update(axis=unit(light.direction), area=light.width * light.height, visible=int(light.visible))
-        row.update(side=side * light.width / 2, upward=upward * light.height / 2)
-    return row
-
-
-def light_records(scene: Scene, precision: Precision) -> Record:
-    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty)."""
-    rows = [_light_row(light) for light in (*single_lights(scene), DirectionalLight())]
-    return LIGHT.array(precision, rows)
 
 
 def material_record(

@@ -27,6 +27,7 @@ from clfractal.integrators.kernel import (
     WaveNeeds,
     flat_text,
 )
+from clfractal.integrators.lights import light_records
 from clfractal.integrators.march import march_record
 from clfractal.integrators.passes import pass_defines
 from clfractal.integrators.path_state import path_state_text
@@ -111,7 +112,7 @@ class SurfaceKernel(TileKernel):
             body.records(precision),
             body.constants(precision),
             records.material_record(scene, precision, packed),
-            records.light_records(scene, precision),
+            light_records(scene, precision),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
             *(

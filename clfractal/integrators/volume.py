@@ -19,6 +19,7 @@ from clfractal.geometry.planes import CUT_PLANE, plane_count, plane_palettes, pl
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
 from clfractal.integrators.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
+from clfractal.integrators.lights import LIGHT, light_records
 from clfractal.integrators.passes import SAMPLING, pass_defines
 from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
@@ -108,7 +109,7 @@ VOLUME = Struct(
     ],
 )
 
-STRUCTS = (records.VIEW, SAMPLING, records.LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
+STRUCTS = (records.VIEW, SAMPLING, LIGHT, records.MATERIAL, ORBIT, CUT_PLANE, GRID, VOLUME)
 
 
 def settings_of(scene: Scene) -> VolumeRenderer:
@@ -205,7 +206,7 @@ class VolumeKernel(TileKernel):
             volume_record(scene, grid, precision, self._environment),
             grid_record(scene, grid, precision),
             records.material_record(scene, precision, self._environment),
-            records.light_records(scene, precision),
+            light_records(scene, precision),
             np.ascontiguousarray(transfer_table(scene, value_range(scene, grid)).T),
             grid.table,
             blocks,

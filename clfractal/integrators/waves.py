@@ -25,14 +25,15 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from clfractal.elements.lights.set import SetLight
 from clfractal.geometry.object_grids import clouds_of
 from clfractal.geometry.planes import has_faces
 from clfractal.geometry.solids import joins_smoothly
 from clfractal.integrators.kernel import MET_NUMBERS, Over, Stage
+from clfractal.integrators.lights import light_rays, single_lights
 from clfractal.integrators.plan import Plan
-from clfractal.integrators.records import bounces, hemisphere_rays, light_rays
+from clfractal.integrators.records import bounces, hemisphere_rays
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import RectangleLight, SetLight, SphereLight
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.shading.maps import (
@@ -42,7 +43,6 @@ from clfractal.shading.maps import (
     has_glass_set,
     has_participating_media,
 )
-from clfractal.shading.set_lights import single_lights
 
 # What a march is after, as in `kernels/integrators/march/rays.h`.
 GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
@@ -121,7 +121,7 @@ def meets_lights(scene: Scene) -> bool:
     """Whether paths of direct light may meet lights: those that have a place and a size."""
     if isinstance(scene.lighting, PathLighting):
         return False
-    return any(isinstance(light, (SphereLight, RectangleLight, SetLight)) for light in scene.lights)
+    return any(light.is_seen for light in scene.lights)
 
 
 def has_wide_lights(scene: Scene) -> bool:

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import dist
 from typing import TYPE_CHECKING
 
+from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, Where
 from clfractal.files.channels import (
     CRYPTOMATTE_MATERIALS,
@@ -15,7 +16,6 @@ from clfractal.files.channels import (
 )
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PlacedLight, SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
 from clfractal.scene.objects import FormulaObject
@@ -296,11 +296,11 @@ def _check_lights(scene: Scene) -> None:
         return
     center, radius = scene.bounds
     candidates = [
-        (index, light.position)
+        (index, place)
         for index, light in enumerate(scene.lights)
-        if isinstance(light, PlacedLight)
-        and dist(light.position, center) <= radius
-        and not any(plane.cuts_set and plane.in_front(light.position) for plane in scene.cut_planes)
+        if (place := light.stands_at) is not None
+        and dist(place, center) <= radius
+        and not any(plane.cuts_set and plane.in_front(place) for plane in scene.cut_planes)
     ]
     if not candidates:
         return

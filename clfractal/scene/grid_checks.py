@@ -2,7 +2,6 @@
 
 from clfractal.errors import SceneError, Where
 from clfractal.scene.grid_values import is_finite_somewhere, lacking
-from clfractal.scene.lighting import PlacedLight
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import PlacedGrid, placed, used_level, volumes_of
 from clfractal.schema.base import Vector
@@ -40,8 +39,9 @@ def _check_lights(scene: Scene, name: str, body: PlacedGrid, level: float) -> No
     if inside(scene.camera.position):
         return
     for index, light in enumerate(scene.lights):
-        if isinstance(light, PlacedLight) and inside(light.position):
-            shown = ", ".join(f"{x:g}" for x in light.position)
+        place = light.stands_at
+        if place is not None and inside(place):
+            shown = ", ".join(f"{x:g}" for x in place)
             raise SceneError(
                 f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",
                 Where(path=f"lights.{index}.position"),

@@ -1,232 +1,31 @@
 """What lights a scene: lights, an environment, and the fog between the eye and the surface."""
 
-from typing import Annotated, Literal, Self
+from typing import TYPE_CHECKING, Annotated, Self, TypeAlias
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, model_validator
 
-from clfractal.schema.ball import Ball
 from clfractal.schema.base import (
     Amount,
     Color,
     Coordinate,
     Direction,
-    Fraction,
     Length,
-    Position,
     Reflectance,
     Section,
-    Vector,
-    chosen_by,
-    cross,
     length,
     problem,
-    unit,
 )
 from clfractal.schema.fields import Usual
-from clfractal.schema.stops import Palette, check_order
-from clfractal.schema.temperature import black_body
-from clfractal.schema.trap import Trap
+from clfractal.schema.kinds import members, one_of
+from clfractal.schema.light import LightBase
 
 MAX_LIGHTS = 64
-MAX_PLACES = 20_000
 
-
-class LightBase(Section):
-    """Keys that every light has."""
-
-    color: Color = Field((1.0, 1.0, 1.0), description="linear Rec. 709")
-    temperature: Annotated[float, Field(strict=True, ge=1000, le=40000), Usual(1500, 12000)] | None = Field(
-        None,
-        description="kelvin: the colour of a black body, of luminance 1, in place of `color`; null: `color`",
-    )
-    intensity: Annotated[Amount, Usual(0, 4)] = Field(1.0, description="factor on the colour")
-    shadow: bool = Field(True, description="whether the set blocks this light")
-    rays: Annotated[int, Field(strict=True, ge=1, le=1024), Usual(1, 64)] | None = Field(
-        None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
-    )
-
-    @model_validator(mode="after")
-    def _one_color(self) -> Self:
-        if self.temperature is not None and self.color != (1.0, 1.0, 1.0):
-            raise problem("cannot be combined with color: give one of color or temperature", "temperature")
-        return self
-
-    @property
-    def used_color(self) -> Vector:
-        """Linear Rec. 709: the light's own colour, or that of its temperature."""
-        return self.color if self.temperature is None else black_body(self.temperature)
-
-    @property
-    def has_size(self) -> bool:
-        """Whether its light comes from more than one direction, so that shadows are soft."""
-        return True
-
-    @property
-    def used_rays(self) -> int:
-        """Shadow rays per sample: one for a hard shadow, because further rays would be the same."""
-        if not self.has_size:
-            return 1
-        return self.rays if self.rays is not None else 8
-
-
-class SmallLight(LightBase):
-    """A light that has one direction at each place, or about one."""
-
-    angular_size: Annotated[float, Usual(0, 45)] = Field(
-        0.0,
-        ge=0,
-        le=170,
-        description="diameter of the light as seen from the surface, degrees; 0: hard shadows",
-    )
-
-    @property
-    def has_size(self) -> bool:
-        """Whether shadows are soft."""
-        return self.angular_size > 0
-
-
-class DirectionalLight(SmallLight):
-    """Light from infinitely far away."""
-
-    tag = "directional"
-    type: Literal["directional"] = "directional"
-    direction: Direction = Field((-1.0, 1.0, -1.0), description="direction in which the light travels")
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
-        return self
-
-
-class PointLight(SmallLight):
-    """Light from a point."""
-
-    tag = "point"
-    type: Literal["point"] = "point"
-    position: Position = Field(description="scene units")
-    falloff: Literal["none", "inverse_square"] = Field(
-        "none", description="how the light weakens with distance"
-    )
-
-
-class SpotLight(SmallLight):
-    """Light from a point into a cone."""
-
-    tag = "spot"
-    type: Literal["spot"] = "spot"
-    position: Position = Field(description="scene units")
-    direction: Direction = Field(
-        (0.0, 0.0, -1.0), description="axis of the cone, along which the light travels"
-    )
-    angle: float = Field(40.0, gt=0, le=180, description="full angle of the cone, degrees")
-    softness: Fraction = Field(
-        0.2, description="part of the cone's half angle over which the light fades at its rim; 0: a sharp rim"
-    )
-    falloff: Literal["none", "inverse_square"] = Field(
-        "inverse_square", description="how the light weakens with distance"
-    )
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
-        return self
-
-
-class SphereLight(LightBase):
-    """A ball that shines evenly; `intensity` times the colour is the radiance that it shows."""
-
-    tag = "sphere"
-    type: Literal["sphere"] = "sphere"
-    position: Position = Field(description="its centre, scene units")
-    radius: Length = Field(0.1, description="scene units")
-    visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
-
-
-class RectangleLight(LightBase):
-    """A rectangle that shines on one side; `intensity` times the colour is the radiance that it shows."""
-
-    tag = "rectangle"
-    type: Literal["rectangle"] = "rectangle"
-    position: Position = Field(description="its middle, scene units")
-    direction: Direction = Field((0.0, 0.0, -1.0), description="where its shining side looks to")
-    up: Direction = Field((0.0, 1.0, 0.0), description="about along its height; not along `direction`")
-    width: Length = Field(1.0, description="scene units")
-    height: Length = Field(1.0, description="scene units")
-    visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
-
-    @model_validator(mode="after")
-    def _has_a_frame(self) -> Self:
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
-        if length(self.up) < 1e-12:
-            raise problem("must not be zero", "up")
-        if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
-            raise problem("must not be along direction", "up")
-        return self
-
-    @property
-    def frame(self) -> tuple[Vector, Vector]:
-        """Directions of its width and of its height, length 1."""
-        side = unit(cross(self.direction, self.up))
-        return side, unit(cross(side, self.direction))
-
-
-class SetLight(LightBase):
-    """Small balls that stand on the set, where its orbits come near a trap; each shows `intensity` times the colour."""
-
-    tag = "set"
-    type: Literal["set"] = "set"
-    intensity: Amount = Field(1.0, description="factor on the colour")
-    trap: Trap = Field(
-        default_factory=dict,
-        validate_default=True,
-        description="the shape near which orbits of its places come",
-    )
-    threshold: Length = Field(0.1, description="largest distance of an orbit from the trap")
-    count: Annotated[int, Field(strict=True, ge=1, le=MAX_PLACES)] = Field(
-        2000, description="most of these balls; fewer if `spacing` leaves room for fewer"
-    )
-    spacing: Length | None = Field(
-        None, description="least distance between two, scene units; null: as far apart as so many can be"
-    )
-    within: Ball | None = Field(None, description="ball in which they stand; null: the bounds")
-    radius: Length | None = Field(
-        None, description="of each ball, scene units; null: 1/200 of the bounds' radius"
-    )
-    height: Length | None = Field(
-        None,
-        description="of their middles over the surface, scene units; null: the radius, so that they lie on it",
-    )
-    palette: Palette | None = Field(
-        None, description="colours, times `color`, by the orbit's distance over the threshold; null: `color`"
-    )
-    visible: bool = Field(True, description="whether the eye sees them; mirrors and paths of light always do")
-    seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = Field(0, description="chooses the places")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.palette is not None:
-            check_order(self.palette)
-        return self
-
-    @property
-    def used_rays(self) -> int:
-        """Shadow rays per sample, each to one of them."""
-        return self.rays if self.rays is not None else 8
-
-
-PlacedLight = PointLight | SpotLight | SphereLight | RectangleLight
-Light = Annotated[
-    Annotated[DirectionalLight, Tag("directional")]
-    | Annotated[PointLight, Tag("point")]
-    | Annotated[SpotLight, Tag("spot")]
-    | Annotated[SphereLight, Tag("sphere")]
-    | Annotated[RectangleLight, Tag("rectangle")]
-    | Annotated[SetLight, Tag("set")],
-    chosen_by("type", "directional"),
-]
+# Kinds of lights are what the folder holds.
+if TYPE_CHECKING:
+    Light: TypeAlias = LightBase
+else:
+    Light = one_of(members("lights"), "type", "directional")
 Lights = Annotated[tuple[Light, ...], Field(strict=False, max_length=MAX_LIGHTS)]
 
 MapName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]

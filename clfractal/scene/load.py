@@ -13,6 +13,7 @@ from typing import Any
 from pydantic import ValidationError
 
 from clfractal.device.activity import doing
+from clfractal.elements.lights.set import SetLight
 from clfractal.errors import ClfractalError, FileError, SceneError, Where, arguments
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.embedded import read_scene_text
@@ -24,7 +25,6 @@ from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.inline import inlined
-from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
 from clfractal.scene.parts import MAX_SIDE, Image

@@ -5,7 +5,6 @@ from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
-from clfractal.scene.lighting import PlacedLight, RectangleLight, SphereLight
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
 from clfractal.scene.surface import SurfaceRenderer
@@ -203,12 +202,13 @@ def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     inside = _inside(scene, solid.material or scene.material.name)
     opened = [plane for plane in scene.cut_planes if name in plane.cut_objects]
     for index, light in enumerate(scene.lights):
-        if inside and isinstance(light, (SphereLight, RectangleLight)):
+        if inside and light.is_seen:
             continue  # paths find it, since it has a size
-        if isinstance(light, PlacedLight) and solid.holds(light.position):
-            if any(plane.in_front(light.position) for plane in opened):
+        place = light.stands_at
+        if place is not None and solid.holds(place):
+            if any(plane.in_front(place) for plane in opened):
                 continue
-            shown = ", ".join(f"{x:g}" for x in light.position)
+            shown = ", ".join(f"{x:g}" for x in place)
             raise SceneError(
                 f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",
                 Where(path=f"lights.{index}.position"),

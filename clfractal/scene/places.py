@@ -9,10 +9,10 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
+from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, Where
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.language import Chain
-from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.schema.base import unit
 from clfractal.schema.trap import Trap

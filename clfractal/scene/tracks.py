@@ -4,11 +4,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
+from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, unknown_name
 from clfractal.files.marks import split_path
 from clfractal.scene.camera_base import WORDS, CameraBase, Orbit
 from clfractal.scene.formula import FormulaSpec
-from clfractal.scene.lighting import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from clfractal.scene.volume import Box

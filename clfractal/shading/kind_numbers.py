@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-LIGHT_KINDS = {"directional": 0, "point": 1, "spot": 2, "sphere": 3, "rectangle": 4}
 TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
 # In the order of when they are known: with the hit, with all of a pixel's points, by asking the formula.
 COLORINGS = {
@@ -38,7 +37,6 @@ FEATURES = {
 }
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
-    "LIGHT": LIGHT_KINDS,
     "TRAP": TRAPS,
     "COLORING": COLORINGS,
     "ALONG": ALONG,

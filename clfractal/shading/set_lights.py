@@ -10,13 +10,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Precision
-from clfractal.scene.lighting import DirectionalLight, PlacedLight, SetLight
+from clfractal.elements.lights.set import SetLight
 from clfractal.scene.model import Scene
 from clfractal.scene.places import places_of
 
@@ -54,14 +53,6 @@ class SetLights:
     rays: int
     count: int
     data: Floats
-
-
-SingleLight: TypeAlias = DirectionalLight | PlacedLight
-
-
-def single_lights(scene: Scene) -> list[SingleLight]:
-    """The lights that have records of their own."""
-    return [light for light in scene.lights if not isinstance(light, SetLight)]
 
 
 def set_lights_of(scene: Scene) -> SetLights | None:

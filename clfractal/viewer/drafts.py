@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from clfractal.device.cancel import CancelToken
+from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
 from clfractal.scene.light_paths import DirectLighting, PathLighting
-from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight
+from clfractal.scene.lighting import MAX_LIGHTS
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.pacing import Pacing

@@ -14,12 +14,12 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.camera.views import View
-from clfractal.scene.lighting import DirectionalLight, PlacedLight, SetLight
+from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST
+from clfractal.schema.light import LightBase as Light
 from clfractal.viewer.pointer import Floats, Size, point_at, project
 
-Light = DirectionalLight | PlacedLight | SetLight
 Bounds = tuple[npt.ArrayLike, float]
 
 # Radius of the circle, parts of the picture's smaller side.
@@ -62,11 +62,11 @@ def handle_position(light: Light, view: View, size: Size, bounds: Bounds) -> tup
 
     A point light may be outside the picture.
     """
-    if isinstance(light, SetLight):
-        return None
-    if isinstance(light, PlacedLight):
-        x, y, depth = project(view, light.position, size)
+    if light.stands_at is not None:
+        x, y, depth = project(view, light.stands_at, size)
         return (x, y) if isfinite(x) and isfinite(y) and depth > 0 else None
+    if not isinstance(light, DirectionalLight):
+        return None
     circle, source = light_circle(view, size, bounds), _source(light)
     return (
         circle.x + circle.radius * float(source @ view.side),
@@ -88,13 +88,15 @@ def dragged(
     A directional light comes from the ball's front, or its back if `behind`; beside the circle, from its rim. A point light
     moves in the plane at its depth; one that is not in front of the eye comes to the depth of the ball's middle.
     """
-    if not (isfinite(x) and isfinite(y)) or isinstance(light, SetLight):
+    if not (isfinite(x) and isfinite(y)):
         return light
-    if isinstance(light, PlacedLight):
-        depth = project(view, light.position, size)[2]
+    if light.stands_at is not None:
+        depth = project(view, light.stands_at, size)[2]
         if handle_position(light, view, size, bounds) is None:
             depth = _middle_depth(view, bounds)
         return _placed(light, point_at(view, x, y, size, depth))
+    if not isinstance(light, DirectionalLight):
+        return light
     circle = light_circle(view, size, bounds)
     across, rise = (x - circle.x) / circle.radius, (circle.y - y) / circle.radius
     away = hypot(across, rise)
@@ -126,7 +128,7 @@ def _source(light: DirectionalLight) -> Floats:
     return found
 
 
-def _placed(light: PlacedLight, position: Floats) -> PlacedLight:
+def _placed(light: Light, position: Floats) -> Light:
     if not np.all(np.abs(position) <= LARGEST):
         return light
     return light.model_copy(update={"position": tuple(position.tolist())})

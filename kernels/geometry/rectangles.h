@@ -47,34 +47,3 @@ INLINE real rectangle_place_density(const seen_rectangle *r, real area, real fac
     const real distance = r->height / facing;
     return pick(less(r->angle, LEAST_ANGLE), distance * distance / (area * facing), R(1.0) / r->angle);
 }
-
-// That of a light, and the directions of x, y and z.
-typedef struct {
-    vec side, upward, toward;
-    seen_rectangle seen;
-} light_rectangle;
-
-INLINE light_rectangle rectangle_seen(light_record light, vec point) {
-    light_rectangle r;
-    const vec side = vec_splat(light->side), upward = vec_splat(light->upward), offset = vec_sub(vec_splat(light->vector), point);
-    const real wide = sqrt(vec_dot(side, side)), high = sqrt(vec_dot(upward, upward));
-    r.side = vec_scale(side, R(1.0) / wide);
-    r.upward = vec_scale(upward, R(1.0) / high);
-    r.toward = vec_scale(vec_splat(light->axis), R(-1.0));
-    const real left = vec_dot(offset, r.side) - wide, lower = vec_dot(offset, r.upward) - high;
-    const real height = most(vec_dot(offset, r.toward), (real)(REAL_SMALLEST));
-    r.seen = rectangle_between(left, left + R(2.0) * wide, lower, lower + R(2.0) * high, height);
-    return r;
-}
-
-INLINE vec rectangle_direction(light_record light, vec point, real u, real v) {
-    const light_rectangle r = rectangle_seen(light, point);
-    const vec place = rectangle_place(&r.seen, u, v);
-    return vec_normalize(vec_along(vec_along(vec_scale(r.toward, place.z), place.x, r.side), place.y, r.upward));
-}
-
-// Per steradian, of `rectangle_direction`, for a direction that meets the rectangle.
-INLINE real rectangle_density(light_record light, vec point, vec direction) {
-    const light_rectangle r = rectangle_seen(light, point);
-    return rectangle_place_density(&r.seen, (real)(light->area), vec_dot(direction, r.toward));
-}

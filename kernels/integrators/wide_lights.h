@@ -87,7 +87,7 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const interaction *here, i
     *in = light_at(light, here->point);
     if (w.settings->soft_lights) {
         in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
-        if (light_is_seen(light)) *in = light_along(light, here->point, in->toward);
+        if (light->seen) *in = light_along(light, here->point, in->toward);
     }
     if (!light->shadow) *wanted &= ~*wanted;
     return 1;
@@ -151,7 +151,7 @@ INLINE color wide_light_gathered(stage s, const interaction *here, vec to_viewer
         counters_met(cost, met, 0);
         incidence in = light_at(light, here->point);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
-        if (light_is_seen(light)) in = light_along(light, here->point, in.toward);
+        if (light->seen) in = light_along(light, here->point, in.toward);
         const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }

@@ -28,7 +28,7 @@ typedef struct {
 // The place of a light's sample on the way of a ray of length `far`: by what comes through where the light is as strong everywhere, and
 // by the angle at a light (Kulla and Fajardo 2012). `weight`: density of fog times what comes through, over the probability of the place.
 INLINE real scattering_place(ray r, real far, real u, light_record light, material_record m, real *weight) {
-    if (light->kind == LIGHT_DIRECTIONAL || (!light_is_seen(light) && !light->inverse_square)) {
+    if (!light->seen && !light->inverse_square) {
         const real depth = pick(less(far, R(1e30)), fog_depth(r.origin, r.direction, fmin(far, R(1e30)), m),
                                 -log(fmax(fog_passes_all(r.origin, r.direction, m), R(1e-30))));
         *weight = R(1.0) - exp(-depth);

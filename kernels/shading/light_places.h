@@ -1,60 +1,41 @@
-// Places of lights that have a size: balls by the cone that they fill, rectangles by their solid angle.
+// Places of lights that have a size. One that rays can meet has in its file of `elements/lights/area_lights`:
+//   vec NAME_light_direction(light_record light, vec point, vec middle, real u, real v)   the direction to a place of it; `middle`: to its middle
+//   real NAME_light_density(light_record light, vec point, vec direction)    per steradian, with which that chooses a direction that meets it
+//   real NAME_light_distance(light_record light, vec point, vec direction, real middle)   about how far it is there; `middle`: its middle
+//   mask NAME_light_met(light_record light, vec origin, vec direction, real *distance)    where a ray meets what shines, from outside
+// Others are discs, as large as their angular size from everywhere.
 #include "geometry/rectangles.h"
+#include "elements/lights/area_lights"
 
-// 1 - cos of half the angle that a light fills; for all but rectangles.
-INLINE real light_spread(light_record light, vec point) {
-    if (light->kind != LIGHT_SPHERE) return (real)(light->spread);
-    const vec offset = vec_sub(vec_splat(light->vector), point);
-    const real square = most(vec_dot(offset, offset), (real)(REAL_SMALLEST));
-    const real share = least((real)(light->radius * light->radius) / square, R(1.0));
-    return share / (R(1.0) + sqrt(R(1.0) - share));
-}
-
-// The direction to a place of the light; `middle` is the one to its middle.
+#define DIRECTION_OF(KIND, name) case LIGHT_##KIND: return name##_light_direction(light, point, middle, u, v);
 INLINE vec light_direction(light_record light, vec point, vec middle, real u, real v) {
-    if (light->kind != LIGHT_RECTANGLE) return cone_direction(middle, light_spread(light, point), u, v);
-    return rectangle_direction(light, point, u, v);
+    switch (light->kind) { AREA_LIGHTS(DIRECTION_OF) default: return cone_direction(middle, (real)(light->spread), u, v); }
 }
 
-// How far a rectangle's plane is.
-INLINE real plane_distance(light_record light, vec point, vec direction) {
-    const vec axis = vec_splat(light->axis);
-    return vec_dot(vec_sub(vec_splat(light->vector), point), axis) / vec_dot(direction, axis);
-}
-
-// Per steradian, with which `light_direction` chooses a direction that meets the light.
+#define DENSITY_OF(KIND, name) case LIGHT_##KIND: return name##_light_density(light, point, direction);
 INLINE real light_density(light_record light, vec point, vec direction) {
-    if (light->kind == LIGHT_RECTANGLE) return rectangle_density(light, point, direction);
-    return R(1.0) / (R(2.0) * LIGHT_PI * light_spread(light, point));
+    switch (light->kind) { AREA_LIGHTS(DENSITY_OF) default: return R(1.0) / (R(2.0) * LIGHT_PI * (real)(light->spread)); }
+}
+
+#define DISTANCE_OF(KIND, name) case LIGHT_##KIND: return name##_light_distance(light, point, direction, middle);
+INLINE real light_distance(light_record light, vec point, vec direction, real middle) {
+    switch (light->kind) { AREA_LIGHTS(DISTANCE_OF) default: return middle; }
+}
+
+#define MET_BY(KIND, name) case LIGHT_##KIND: return name##_light_met(light, origin, direction, distance);
+INLINE mask light_met_at(light_record light, vec origin, vec direction, real *distance) {
+    switch (light->kind) { AREA_LIGHTS(MET_BY) default: *distance = R(0.0); return less(R(1.0), R(0.0)); }
 }
 
 // Light from one of the directions that `light_direction` finds: the mean over these is the light's.
 INLINE incidence light_along(light_record light, vec point, vec direction) {
     incidence in = light_at(light, point);
     in.toward = direction;
-    if (light_is_seen(light)) {
+    if (light->seen) {
         in.strength = pick(less(R(0.0), in.strength), (real)(light->intensity) / (LIGHT_PI * light_density(light, point, direction)), R(0.0));
     }
-    if (light->kind == LIGHT_SPHERE) in.distance = most(in.distance - (real)(light->radius), R(0.0));
-    if (light->kind == LIGHT_RECTANGLE) in.distance = plane_distance(light, point, direction);
+    in.distance = light_distance(light, point, direction, in.distance);
     return in;
-}
-
-// Where a ray meets a ball from outside, or a rectangle's shining side.
-INLINE mask light_met_at(light_record light, vec origin, vec direction, real *distance) {
-    const vec offset = vec_sub(vec_splat(light->vector), origin);
-    if (light->kind == LIGHT_SPHERE) {
-        const real along = vec_dot(offset, direction);
-        const vec across = vec_along(offset, -along, direction);
-        const real inside = (real)(light->radius * light->radius) - vec_dot(across, across);
-        *distance = along - sqrt(most(inside, R(0.0)));
-        return less_equal(R(0.0), inside) & less(R(0.0), *distance);
-    }
-    *distance = plane_distance(light, origin, direction);
-    const vec place = vec_sub(vec_scale(direction, *distance), offset), side = vec_splat(light->side), upward = vec_splat(light->upward);
-    const mask front = less(vec_dot(direction, vec_splat(light->axis)), R(0.0)) & less(R(0.0), *distance);
-    return front & less_equal(fabs(vec_dot(place, side)), vec_dot(side, side)) &
-           less_equal(fabs(vec_dot(place, upward)), vec_dot(upward, upward));
 }
 
 // About the irradiance that a light can bring to a point.
@@ -71,7 +52,7 @@ CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, r
     mask met = less(R(1.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
         light_record light = w.lights + i;
-        if (!light_is_seen(light) || (of_eye && !light->visible)) continue;
+        if (!light->seen || (of_eye && !light->visible)) continue;
         real distance;
         const mask here = light_met_at(light, *origin, *direction, &distance) & less(distance, *far);
         if (!any_lane(here)) continue;

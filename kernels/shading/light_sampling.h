@@ -47,7 +47,7 @@ INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own,
         if (!any_lane(here)) continue;
         light_ray r;
         if (is_light) {
-            r = light_sample(light, light_is_seen(light) ? from : point, u, v);
+            r = light_sample(light, light->seen ? from : point, u, v);
         } else {
             if (!has_environment(w.material)) continue;
             r.toward = environment_sample(u, v, w.material, w.environment, &r.density);
@@ -55,7 +55,7 @@ INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own,
             r.distance = (real)(REAL_LARGEST);
         }
         takes(&c, here, r, weight);
-        if (!is_light || light_is_met(light) || light_is_seen(light)) c.found.both |= here;
+        if (!is_light || light_is_met(light) || light->seen) c.found.both |= here;
         if (is_light && !light->shadow) c.found.unblocked |= here;
     }
     sample_lights_beside(&c, numbers, w);

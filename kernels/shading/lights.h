@@ -16,7 +16,7 @@ INLINE light_ray light_sample(__constant const struct Light *light, vec point, r
     r.distance = in.distance;
     r.toward = in.toward;
     r.density = R(0.0);
-    if (light_is_seen(light)) {
+    if (light->seen) {
         r.toward = light_direction(light, point, in.toward, u, v);
         const mask met = light_met_at(light, point, r.toward, &r.distance) | less(R(0.0), in.strength);
         r.density = light_density(light, point, r.toward);
@@ -36,7 +36,7 @@ INLINE light_ray light_sample(__constant const struct Light *light, vec point, r
 }
 
 // Whether rays can meet it by chance: discs at infinity. A point light is as large as it should look from each place, and nowhere.
-INLINE int light_is_met(__constant const struct Light *light) { return light->kind == LIGHT_DIRECTIONAL && light->spread > S(0.0); }
+INLINE int light_is_met(__constant const struct Light *light) { return light->far && light->spread > S(0.0); }
 
 // Whether a ray that meets nothing else goes into it.
 INLINE mask light_met(__constant const struct Light *light, vec direction) {

@@ -42,7 +42,7 @@ INLINE color shaded(color surface, vec normal, vec to_viewer, incidence in, mask
     const real diffuse = pick(a.front, l.diffuse * a.facing, R(0.0));
     const mask shines = a.front & less(R(0.0), a.toward_viewer);
     real highlight = pick(shines, pow(pick(shines, a.toward_viewer, R(1.0)), l.shininess), R(0.0));
-    if (light_is_seen(light)) highlight *= R(1.0) - l.sharp;
+    if (light->seen) highlight *= R(1.0) - l.sharp;
     const color body = color_scale(surface, l.ambient * open + diffuse);
     const color brings = color_add(body, color_scale(l.specular, highlight));
     return color_scale(color_mul(brings, color_splat(light->color)), in.strength);

@@ -2,47 +2,7 @@
 //   colour * intensity * (ambient * M + s * (diffuse * M * max(0, N.L) + specular * max(0, R.V)^shininess)),
 // M the surface's colour, s 0 in shadow and 1 outside. Colours are linear Rec. 709.
 #include "shading/color.h"
-
-// A light as seen from a point of the surface.
-typedef struct {
-    vec toward;      // direction to the light, length 1
-    real distance;   // to a point light; largest number for a directional one
-    real strength;   // intensity after falloff
-} incidence;
-
-INLINE incidence light_from_middle(light_record light, vec point) {
-    const vec vector = vec_splat(light->vector);
-    const real bright = (real)(light->intensity);
-    if (light->kind == LIGHT_DIRECTIONAL) return (incidence){vec_scale(vector, R(-1.0)), (real)(REAL_LARGEST), bright};
-    const vec offset = vec_sub(vector, point);
-    const real square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
-    return (incidence){vec_normalize(offset), sqrt(square), light->inverse_square ? bright / square : bright};
-}
-
-// What a point shows of a light whose middle lies that far: a spot's cone, a ball's or a rectangle's size.
-INLINE real light_shape(light_record light, vec toward, real square) {
-    const vec axis = vec_splat(light->axis);
-    const real along = -vec_dot(toward, axis);
-    if (light->kind == LIGHT_SPHERE) return least((real)(light->radius * light->radius) / square, R(1.0));
-    if (light->kind == LIGHT_RECTANGLE) {
-        return (real)(light->area) * R(0.3183098861837907) * most(along, R(0.0)) / square;
-    }
-    // Of the angle, which keeps its digits in narrow cones.
-    const vec across = vec_cross(toward, axis);
-    const real angle = atan2(sqrt(vec_dot(across, across)), along);
-    const scalar wide = light->rim[0], narrow = light->rim[1];
-    if (wide <= narrow) return pick(less_equal(angle, (real)(wide)), R(1.0), R(0.0));
-    const real t = most(least(((real)(wide) - angle) * (real)(S(1.0) / (wide - narrow)), R(1.0)), R(0.0));
-    return t * t * (R(3.0) - R(2.0) * t);
-}
-
-INLINE int light_is_seen(light_record light) { return light->kind == LIGHT_SPHERE || light->kind == LIGHT_RECTANGLE; }
-
-INLINE incidence light_at(light_record light, vec point) {
-    incidence in = light_from_middle(light, point);
-    if (light->kind >= LIGHT_SPOT) in.strength *= light_shape(light, in.toward, in.distance * in.distance);
-    return in;
-}
+#include "shading/light_at.h"
 
 // x^shininess for 0 <= x: whole exponents by squaring, which loses no more than x itself has lost.
 INLINE real highlight_of(real x, scalar shininess) {

@@ -9,7 +9,7 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.integrators.records import LIGHT
+from clfractal.integrators.lights import LIGHT
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.lighting import MAX_LIGHTS
 from tests.gpu import limits

@@ -11,7 +11,7 @@ from scipy.stats import chi2, qmc
 
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
-from clfractal.integrators.records import LIGHT
+from clfractal.integrators.lights import LIGHT
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = f"""\
@@ -21,6 +21,7 @@ _TEXT = f"""\
 #include "structs.h"
 #include "integrators/sampling.h"
 #include "geometry/rectangles.h"
+#include "elements/lights/area_lights/rectangle.h"
 {LOADS}
 // Planes of `count` numbers. In: u, v. Out: the direction, its density.
 __kernel void look(__global const scalar *in, __global scalar *out, __constant struct Light *light, scalar x, scalar y,
@@ -29,11 +30,11 @@ __kernel void look(__global const scalar *in, __global scalar *out, __constant s
     in += lane;
     out += lane;
     const vec point = vec_of((real)(x), (real)(y), (real)(z));
-    const vec chosen = rectangle_direction(light, point, load(in), load(in + count));
+    const vec chosen = rectangle_light_direction(light, point, vec_of(R(0.0), R(0.0), R(1.0)), load(in), load(in + count));
     store(out, chosen.x);
     store(out + count, chosen.y);
     store(out + 2 * count, chosen.z);
-    store(out + 3 * count, rectangle_density(light, point, chosen));
+    store(out + 3 * count, rectangle_light_density(light, point, chosen));
 }}
 """
 # A window of 3 by 1 that shines to -z, turned about z.

@@ -10,8 +10,9 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
+from clfractal.elements.lights.directional import DirectionalLight
+from clfractal.elements.lights.point import PointLight
 from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.lighting import DirectionalLight, PointLight
 from clfractal.scene.model import Scene
 from tests.render.shots import (
     BALL,

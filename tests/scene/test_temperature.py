@@ -2,8 +2,9 @@
 
 import pytest
 
+from clfractal.elements.lights.point import PointLight
+from clfractal.elements.lights.rectangle import RectangleLight
 from clfractal.errors import SceneError
-from clfractal.scene.lighting import PointLight, RectangleLight
 from clfractal.schema.temperature import black_body, chromaticity
 
 

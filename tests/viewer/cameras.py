@@ -10,7 +10,8 @@ import numpy.typing as npt
 from hypothesis import strategies as st
 
 from clfractal.camera.views import camera_view
-from clfractal.scene.lighting import DirectionalLight, PointLight
+from clfractal.elements.lights.directional import DirectionalLight
+from clfractal.elements.lights.point import PointLight
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.rectangle import Plane
 from clfractal.viewer import navigation

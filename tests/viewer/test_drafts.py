@@ -10,12 +10,12 @@ import pytest
 
 from clfractal.device import activity
 from clfractal.device.select import Device
+from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
 from clfractal.scene.light_paths import DirectLighting
-from clfractal.scene.lighting import DirectionalLight
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.drafts import draft
 from clfractal.viewer.pacing import Pacing

@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.camera.views import View, camera_view, eye_view, middle_view
-from clfractal.scene.lighting import DirectionalLight, PointLight
+from clfractal.elements.lights.directional import DirectionalLight
+from clfractal.elements.lights.point import PointLight
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.stereo import Eye, Stereo
 from clfractal.viewer import handles, overlays

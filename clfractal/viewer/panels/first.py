@@ -7,15 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.elements.lights.set import SetLight
 from clfractal.formulas import catalog
-from clfractal.scene.lighting import (
-    DirectionalLight,
-    Light,
-    RectangleLight,
-    SetLight,
-    SphereLight,
-)
 from clfractal.scene.places import usual_threshold
+from clfractal.schema.kinds import members
+from clfractal.schema.light import LightBase
 from clfractal.schema.shape import solids
 from clfractal.viewer.panels import menu, right_dock, theme
 from clfractal.viewer.panels.metadata import plain
@@ -28,8 +24,6 @@ from clfractal.viewer.sight import Area, Sight, sight_of
 _SOLID, _FORMULA = 0.11, 0.22
 # The least part of the window that is taken for free.
 _LEAST_FREE = 0.25
-# Sizes of lights, parts of their distance from what they light.
-_BALL, _AREA, _CONE = 0.1, 0.6, 60.0
 # Of lights on the set: their number; radii, and heights over the surface to light it, parts of the bounds' radius;
 # and how bright they are.
 _COUNT, _SMALL, _HIGH, _BRIGHT = 600, 1 / 90, 1 / 20, 12.0
@@ -103,7 +97,7 @@ def _level(ui: Ui, found: Sight, size: float) -> dict[str, Any]:
 # Lights
 
 
-def light(ui: Ui, kind: str, before: Light | None = None) -> dict[str, Any]:
+def light(ui: Ui, kind: str, before: LightBase | None = None) -> dict[str, Any]:
     """The first values of a light of a kind.
 
     Args:
@@ -114,54 +108,32 @@ def light(ui: Ui, kind: str, before: Light | None = None) -> dict[str, Any]:
     values: dict[str, Any] = {"type": kind}
     if before is not None:
         values |= {name: plain(getattr(before, name)) for name in _LIT}
-        position = getattr(before, "position", None)
-        place = np.array(position, float) if position is not None else place
+        place = np.array(before.stands_at, float) if before.stands_at is not None else place
     way = point - place
     away = float(np.linalg.norm(way))
     if not away > 0:
         way, away = found.view.axis, found.body.radius
-    if kind == "set":
+    if kind == SetLight.tag:
         return values | _of_set(ui, before)
-    if kind == "directional":
-        way = found.view.axis + 0.64 * found.view.side - 0.79 * found.view.up if before is None else way
-        return values | {"direction": vector(way / np.linalg.norm(way), 1.0), **_strength(before, kind, away)}
-    values["position"] = vector(place, away)
-    if kind in ("spot", "rectangle"):
-        values["direction"] = vector(way / away, 1.0)
-    if kind == "spot":
-        values["angle"] = _CONE
-    if kind == "sphere":
-        values["radius"] = short(_BALL * away)
-    if kind == "rectangle":
-        side = short(_AREA * away)
+    found_kind = next(each for each in members("lights") if each.tag == kind)
+    assert issubclass(found_kind, LightBase)
+    keys, sizes = found_kind.model_fields, found_kind.first(away)
+    if "position" in keys:
+        values["position"] = vector(place, away)
+    elif before is None:
+        way = found.view.axis + 0.64 * found.view.side - 0.79 * found.view.up
+    if "direction" in keys:
+        values["direction"] = vector(way / np.linalg.norm(way), 1.0)
+    if "up" in keys:
         upright = abs(way[2]) < 0.9 * away
-        values |= {"up": [0.0, 0.0, 1.0] if upright else [0.0, 1.0, 0.0], "width": side, "height": side}
-    return values | _strength(before, kind, away)
+        values["up"] = [0.0, 0.0, 1.0] if upright else [0.0, 1.0, 0.0]
+    # As much light for what is so far away as the one before gives, or as 1 from far.
+    given = 1.0 if before is None else before.intensity * before.given(away)
+    each = found_kind.checked({**values, **sizes, "intensity": 1.0}).given(away)
+    return values | _short(sizes) | {"intensity": float(f"{given / each:.3g}")}
 
 
-def _strength(before: Light | None, kind: str, away: float) -> dict[str, Any]:
-    """The intensity by which a light gives as much light to what is so far away as the one before, or as 1 from far."""
-    given = 1.0 if before is None else before.intensity * _given(before, away)
-    each = {
-        "spot": 1 / away**2,
-        "sphere": _BALL**2,
-        "rectangle": _AREA**2 / math.pi,
-    }.get(kind, 1.0)
-    return {"intensity": float(f"{given / each:.3g}")}
-
-
-def _given(light: Light, away: float) -> float:
-    """What a light of intensity 1 gives to a surface that faces it, so far away; a directional one gives 1."""
-    if isinstance(light, SphereLight):
-        return min(light.radius / away, 1.0) ** 2
-    if isinstance(light, RectangleLight):
-        return min(light.width * light.height / (math.pi * away**2), 1.0)
-    if isinstance(light, (DirectionalLight, SetLight)) or light.falloff == "none":
-        return 1.0
-    return 1 / away**2
-
-
-def _of_set(ui: Ui, before: Light | None) -> dict[str, Any]:
+def _of_set(ui: Ui, before: LightBase | None) -> dict[str, Any]:
     """Lights on the set stand where its orbits come nearest to the trap: how near that is differs from set to set."""
     if isinstance(before, SetLight):
         return {}

@@ -6,7 +6,10 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.lighting import MAX_LIGHTS, DirectionalLight, SetLight, SmallLight
+from clfractal.scene.lighting import MAX_LIGHTS
+from clfractal.schema.kinds import members
+from clfractal.schema.light import LightBase, SmallLight
+from clfractal.schema.trap import Trap
 from clfractal.viewer.panels import first, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.buttons import area
@@ -14,29 +17,10 @@ from clfractal.viewer.panels.color_button import shown
 from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
-# What only some kinds have.
-_OWN = ("falloff", "direction", "angle", "softness", "up", "radius", "width", "height", "visible")
-# Of lights on the set.
-_PLACES = ("threshold", "count", "spacing", "radius", "height", "visible", "seed")
-
-
-KINDS = {
-    "directional": "Sun",
-    "point": "Point",
-    "spot": "Spot",
-    "sphere": "Ball",
-    "rectangle": "Area",
-    "set": "Set",
-}
+_LIGHTS = [kind for kind in members("lights") if issubclass(kind, LightBase)]
+KINDS = {kind.tag: kind.title for kind in _LIGHTS}
 """Kinds of lights, as they are called."""
-_ABOUT = {
-    "directional": "from infinitely far away",
-    "point": "from a point",
-    "spot": "in a cone",
-    "sphere": "of a ball",
-    "rectangle": "of a rectangle",
-    "set": "of many balls on the set",
-}
+_ABOUT = {kind.tag: kind.about for kind in _LIGHTS}
 
 
 def summary(ui: Ui) -> str:
@@ -79,7 +63,7 @@ def _line(index: int, light: Any, chosen: bool) -> bool:
     draw.add_circle_filled(middle, 6.0, theme.packed((*codes, 1.0)))
     draw.add_circle(middle, 6.0, theme.packed((1, 1, 1, 0.25)))
     y = corner.y + (height - imgui.get_font_size()) / 2
-    name = KINDS[light.type]
+    name = KINDS[light.tag]
     draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), f"{name} {index + 1}")
     text = f"{light.intensity:.3g}"
     place = imgui.ImVec2(corner.x + wide - imgui.calc_text_size(text).x - 8, y)
@@ -137,32 +121,25 @@ def _light(ui: Ui, index: int) -> None:
     about = ", ".join(f"{title}: {_ABOUT[kind]}" for kind, title in KINDS.items())
     width = w.row(ui, "Type", path=f"{path}.type", tip=about)
     if width is not None:
-        found = w.segments(f"{path}.type", KINDS, light.type, width)
+        found = w.segments(f"{path}.type", KINDS, light.tag, width)
         if found is not None:
             ui.studio.edit({path: first.light(ui, found, light)})
             return
         w.problem(ui, path)
     w.fields(ui, path, ("color", "temperature", "intensity"))
-    if isinstance(light, DirectionalLight):
-        w.field(ui, f"{path}.direction", step=0.01)
-    elif isinstance(light, SetLight):
-        keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
-            light.trap.shape, ("center", "direction")
-        )
-        w.fields(ui, f"{path}.trap", ("shape", *keys))
-        small = float(f"{ui.studio.scene.bounds[1] / 200:.2g}")
-        w.fields(
-            ui,
-            path,
-            _PLACES,
-            spacing={"auto": "even", "start": 4 * small},
-            radius={"auto": "1/200 of the bounds", "start": small},
-            height={"auto": "radius", "start": small},
-        )
-    else:
-        radius = ui.studio.scene.bounds[1]
-        w.field(ui, f"{path}.position", step=0.01 * radius)
-        w.fields(ui, path, tuple(name for name in _OWN if hasattr(light, name)))
+    radius = ui.studio.scene.bounds[1]
+    options = {"position": {"step": 0.01 * radius}, **light.controls(radius)}
+    for name in type(light).model_fields:
+        if name in SmallLight.model_fields or name in ("type", *light.beside):
+            continue
+        value = getattr(light, name)
+        if isinstance(value, Trap):
+            keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
+                value.shape, ("center", "direction")
+            )
+            w.fields(ui, f"{path}.{name}", ("shape", *keys))
+        else:
+            w.field(ui, f"{path}.{name}", **options.get(name, {}))
     w.field(ui, f"{path}.shadow")
     if light.shadow:
         if isinstance(light, SmallLight):

@@ -1,0 +1,72 @@
+"""A rectangle that shines."""
+
+from math import pi
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from clfractal.schema.base import Direction, Length, Position, Vector, cross, length, problem, unit
+from clfractal.schema.light import AXIS, SingleLight, check_ways
+from clfractal.schema.record import Number
+
+
+class RectangleLight(SingleLight):
+    """A rectangle that shines on one side; `intensity` times the colour is the radiance that it shows."""
+
+    tag = "rectangle"
+    title = "Area"
+    about = "of a rectangle"
+    place = 50
+    is_seen = True
+    numbers = (
+        AXIS,
+        Number("side", "real", 3, "a rectangle's middle to its right rim, scene units"),
+        Number("upward", "real", 3, "the same, to its upper rim"),
+        Number("area", "real", 0, "of a rectangle, square scene units"),
+    )
+    type: Literal["rectangle"] = "rectangle"
+    position: Position = Field(description="its middle, scene units")
+    direction: Direction = Field((0.0, 0.0, -1.0), description="where its shining side looks to")
+    up: Direction = Field((0.0, 1.0, 0.0), description="about along its height; not along `direction`")
+    width: Length = Field(1.0, description="scene units")
+    height: Length = Field(1.0, description="scene units")
+    visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
+
+    @model_validator(mode="after")
+    def _has_a_frame(self) -> Self:
+        check_ways(self, "direction", "up")
+        if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
+            raise problem("must not be along direction", "up")
+        return self
+
+    @classmethod
+    def first(cls, away: float) -> dict[str, Any]:
+        """As of every light."""
+        return {"width": 0.6 * away, "height": 0.6 * away}
+
+    def given(self, away: float) -> float:
+        """As of every light."""
+        return min(self.width * self.height / (pi * away**2), 1.0)
+
+    @property
+    def stands_at(self) -> Vector:
+        """As of every light."""
+        return self.position
+
+    @property
+    def frame(self) -> tuple[Vector, Vector]:
+        """Directions of its width and of its height, length 1."""
+        side = unit(cross(self.direction, self.up))
+        return side, unit(cross(side, self.direction))
+
+    def packed(self) -> dict[str, object]:
+        """As of every light."""
+        side, upward = self.frame
+        return {
+            **super().packed(),
+            "axis": unit(self.direction),
+            "side": tuple(each * self.width / 2 for each in side),
+            "upward": tuple(each * self.height / 2 for each in upward),
+            "area": self.width * self.height,
+            "visible": int(self.visible),
+        }

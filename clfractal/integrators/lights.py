@@ -1,0 +1,78 @@
+"""The record of a light, and how a scene's lights fill it; what differs from kind to kind their classes say."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from clfractal.device.orbit import Record
+from clfractal.device.source import kinds
+from clfractal.device.structs import Field, Precision, Struct
+from clfractal.elements.lights.directional import DirectionalLight
+from clfractal.scene.model import Scene
+from clfractal.schema.kinds import members
+from clfractal.schema.light import SingleLight
+from clfractal.schema.record import all_numbers
+
+LIGHT_KINDS = kinds("elements/lights")
+_SINGLE = [kind for kind in members("lights") if issubclass(kind, SingleLight)]
+_NUMBERS = all_numbers(kind.numbers for kind in _SINGLE)
+
+LIGHT = Struct(
+    "Light",
+    [
+        Field(
+            "vector", "real", 3, "of a far light where it travels to, length 1; else its place, scene units"
+        ),
+        Field("color", "real", 3, "linear Rec. 709"),
+        Field("intensity", "real", 0, "factor on the colour"),
+        Field("kind", "int", 0, "LIGHT_"),
+        Field("far", "int", 0, "1: infinitely far away"),
+        Field("seen", "int", 0, "1: it has a place and a size, and rays meet it"),
+        Field("inverse_square", "int", 0, "1: weakens with the square of the distance"),
+        Field("shadow", "int", 0, "1: blocked by the set"),
+        Field("spread", "real", 0, "1 - cos of half its angular size"),
+        Field("rays", "int", 0, "shadow rays of a shot"),
+        Field("share", "real", 0, "one over that"),
+        Field("visible", "int", 0, "1: the eye sees it"),
+        *(Field(each.name, each.type, each.count, each.meaning) for each in _NUMBERS),
+    ],
+)
+
+
+def single_lights(scene: Scene) -> list[SingleLight]:
+    """The lights that have records of their own."""
+    return [light for light in scene.lights if isinstance(light, SingleLight)]
+
+
+def light_rays(scene: Scene) -> int:
+    """Most shadow rays of a shot that a light has."""
+    return max((light.used_rays for light in single_lights(scene)), default=1)
+
+
+def _light_row(light: SingleLight) -> Mapping[str, object]:
+    row: dict[str, object] = {
+        **{each.name: each.nothing for each in _NUMBERS},
+        "color": light.used_color,
+        "intensity": light.intensity,
+        "kind": LIGHT_KINDS[light.tag],
+        "far": int(light.stands_at is None),
+        "seen": int(light.is_seen),
+        "inverse_square": 0,
+        "shadow": int(light.shadow),
+        "spread": 0.0,
+        "rays": light.used_rays,
+        "share": 1 / light.used_rays,
+        "visible": 0,
+        **light.packed(),
+    }
+    vector = np.array(row["vector"], float)
+    row["vector"] = vector / np.linalg.norm(vector) if light.stands_at is None else vector
+    return row
+
+
+def light_records(scene: Scene, precision: Precision) -> Record:
+    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty)."""
+    rows = [_light_row(light) for light in (*single_lights(scene), DirectionalLight())]
+    return LIGHT.array(precision, rows)

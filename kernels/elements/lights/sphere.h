@@ -1,0 +1,6 @@
+// A ball that shines: as strong as the part of the sky that it fills.
+INLINE incidence sphere_light(light_record light, vec point) {
+    incidence in = light_from_place(light, point);
+    in.strength *= least((real)(light->radius * light->radius) / (in.distance * in.distance), R(1.0));
+    return in;
+}
