@@ -241,6 +241,9 @@ class _Moved:
                 section = part.get(name) or {}
                 if section.get("file") is not None:
                     section["file"] = self._from_there(section["file"])
+            for light in part.get("lights") or ():
+                if light.get("file") is not None:
+                    light["file"] = self._from_there(light["file"])
         rename_textures(data.get("materials") or {}, self._from_there)
         for each in (data.get("objects") or {}).values():
             if each.get("file") is not None:

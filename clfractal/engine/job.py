@@ -256,6 +256,7 @@ class Job:
         surroundings, given = view.scene.surroundings, view.scene.given
         grids = {file: grid.digest for file, grid in view.scene.grids.items()}
         textures = {file: texture.digest for file, texture in view.scene.textures.items()}
+        lights = {" ".join(key): table.digest for key, table in view.scene.light_tables.items()}
         return {
             **found,
             "scene": scene,
@@ -265,6 +266,7 @@ class Job:
             # Only where there are some: work in progress of older versions stays valid.
             **({"textures": textures} if textures else {}),
             **({"grids": grids} if grids else {}),
+            **({"lights": lights} if lights else {}),
             "version": resources.__version__,
             "device": self.device.name,
             "driver": self.device.key,

@@ -1,10 +1,11 @@
-"""The record of a light, and how a scene's lights fill it; what differs from kind to kind their classes say."""
+"""The record of a light, and how a scene's lights fill it; what differs from kind to kind, classes say."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 
 import numpy as np
+import numpy.typing as npt
 
 from clfractal.device.orbit import Record
 from clfractal.device.source import kinds
@@ -15,6 +16,7 @@ from clfractal.schema.kinds import members
 from clfractal.schema.light import SingleLight
 from clfractal.schema.record import all_numbers
 
+Floats = npt.NDArray[np.float32]
 LIGHT_KINDS = kinds("elements/lights")
 _SINGLE = [kind for kind in members("lights") if issubclass(kind, SingleLight)]
 _NUMBERS = all_numbers(kind.numbers for kind in _SINGLE)
@@ -36,6 +38,9 @@ LIGHT = Struct(
         Field("rays", "int", 0, "shadow rays of a shot"),
         Field("share", "real", 0, "one over that"),
         Field("visible", "int", 0, "1: the eye sees it"),
+        Field(
+            "table", "int", 0, "where what it has read of a file begins among the tables; below 0: nowhere"
+        ),
         *(Field(each.name, each.type, each.count, each.meaning) for each in _NUMBERS),
     ],
 )
@@ -51,7 +56,7 @@ def light_rays(scene: Scene) -> int:
     return max((light.used_rays for light in single_lights(scene)), default=1)
 
 
-def _light_row(light: SingleLight) -> Mapping[str, object]:
+def _light_row(light: SingleLight, table: int) -> Mapping[str, object]:
     row: dict[str, object] = {
         **{each.name: each.nothing for each in _NUMBERS},
         "color": light.used_color,
@@ -65,6 +70,7 @@ def _light_row(light: SingleLight) -> Mapping[str, object]:
         "rays": light.used_rays,
         "share": 1 / light.used_rays,
         "visible": 0,
+        "table": table,
         **light.packed(),
     }
     vector = np.array(row["vector"], float)
@@ -72,7 +78,29 @@ def _light_row(light: SingleLight) -> Mapping[str, object]:
     return row
 
 
-def light_records(scene: Scene, precision: Precision) -> Record:
-    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty)."""
-    rows = [_light_row(light) for light in (*single_lights(scene), DirectionalLight())]
+def light_records(scene: Scene, precision: Precision, begin: int = 0) -> Record:
+    """The lights, and a white one that stands for those on the set (and for none, since no buffer is empty).
+
+    Args:
+        begin: how many numbers stand before those of `light_tables`.
+    """
+    places = {}
+    for key, table in scene.light_tables.items():
+        places[key] = begin
+        begin += table.numbers.size
+    rows = [
+        _light_row(light, -1 if light.reads is None else places[light.tag, light.reads])
+        for light in (*single_lights(scene), DirectionalLight())
+    ]
     return LIGHT.array(precision, rows)
+
+
+def light_tables(scene: Scene) -> Floats:
+    """What the lights have read of files, one after the other."""
+    tables = [table.numbers for table in scene.light_tables.values()]
+    return np.concatenate(tables) if tables else np.zeros(0, np.float32)
+
+
+def tables_key(scene: Scene) -> str:
+    """A text that differs for different tables."""
+    return " ".join(["lights", *(table.digest for table in scene.light_tables.values())])

@@ -27,7 +27,7 @@ from clfractal.integrators.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.integrators.lights import light_records
+from clfractal.integrators.lights import light_records, light_tables, tables_key
 from clfractal.integrators.march import march_record
 from clfractal.integrators.passes import pass_defines
 from clfractal.integrators.path_state import path_state_text
@@ -106,13 +106,13 @@ class SurfaceKernel(TileKernel):
         if surroundings is not None:
             packed = once(f"environment {surroundings.digest}", lambda: packed_map(surroundings))
         on_set, body = set_lights_of(scene), Body.of(scene)
-        of_maps, tables = self._tables()
+        of_maps, before, tables = self._tables()
         return [
             march_record(scene, precision, self.plan.divider, packed, on_set, state_places(scene, self.plan)),
             body.records(precision),
             body.constants(precision),
             records.material_record(scene, precision, packed),
-            light_records(scene, precision),
+            light_records(scene, precision, before),
             self._palette(),
             packed.data if packed is not None else np.zeros(4, np.float32),
             *(
@@ -138,14 +138,22 @@ class SurfaceKernel(TileKernel):
         records_of = MappedMaterials(self.scene).records(self.precision)
         return [records_of, albedos, no_maps if found is None else found.map_records(self.precision)]
 
-    def _tables(self) -> tuple[int, Floats]:
-        """How many numbers the tables of maps have, and these, with the grids of objects behind them."""
+    def _tables(self) -> tuple[int, int, Floats]:
+        """How many numbers the tables of maps have, how many with objects' grids, and these, with what lights have read."""
         once, found, grids = self.resources.once, mapped_materials(self.scene), ObjectGrids(self.scene)
-        of_maps = np.zeros(0, np.float32) if found is None else once(f"maps {found.key}", found.tables)
-        if not grids.volumes:
-            return of_maps.size, of_maps if of_maps.size else np.zeros(4, np.float32)
-        key = f"{grids.key} {'' if found is None else found.key}"
-        return of_maps.size, once(key, lambda: np.concatenate([of_maps, grids.data()]))
+        key, tables = "maps", np.zeros(0, np.float32)
+        if found is not None:
+            key = f"maps {found.key}"
+            tables = once(key, found.tables)
+        of_maps = tables
+        if grids.volumes:
+            key = f"{grids.key} {'' if found is None else found.key}"
+            tables = once(key, lambda: np.concatenate([of_maps, grids.data()]))
+        before = tables
+        if self.scene.light_tables:
+            key = f"{key} {tables_key(self.scene)}"
+            tables = once(key, lambda: np.concatenate([before, light_tables(self.scene)]))
+        return of_maps.size, before.size, tables if tables.size else np.zeros(4, np.float32)
 
     def _palette(self) -> Floats:
         coloring = self.scene.coloring

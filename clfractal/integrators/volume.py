@@ -19,7 +19,7 @@ from clfractal.geometry.planes import CUT_PLANE, plane_count, plane_palettes, pl
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
 from clfractal.integrators.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
-from clfractal.integrators.lights import LIGHT, light_records
+from clfractal.integrators.lights import LIGHT, light_records, light_tables, tables_key
 from clfractal.integrators.passes import SAMPLING, pass_defines
 from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
@@ -214,6 +214,7 @@ class VolumeKernel(TileKernel):
             *(_one_of(grid.normals, pool) for pool in four),
             *_formula_arguments(scene, precision),
             *self._path_arguments(),
+            self._light_tables(),
             *_plane_arguments(scene, precision),
         ]
 
@@ -238,6 +239,12 @@ class VolumeKernel(TileKernel):
             brick_bounds(self.scene, grid, ranges),
             np.zeros(1, np.float32) if packed is None else packed.data,
         ]
+
+    def _light_tables(self) -> npt.NDArray[np.float32]:
+        """What lights have read; without such lights a stand-in."""
+        if not self.scene.light_tables:
+            return np.zeros(1, np.float32)
+        return self.resources.once(tables_key(self.scene), lambda: light_tables(self.scene))
 
     @cached_property
     def _grid_key(self) -> str:

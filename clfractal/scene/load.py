@@ -270,6 +270,7 @@ def _check_environment(scene: Scene) -> None:
 def _check_files(scene: Scene) -> None:
     _ = scene.given
     _ = scene.textures
+    _ = scene.light_tables
     if any(isinstance(each, VolumeObject) for each in scene.objects.values()):
         from clfractal.scene.grid_checks import check_grids
 

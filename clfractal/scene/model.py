@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
     from clfractal.scene.environment import EnvironmentMap
     from clfractal.scene.given import GivenGrid
+    from clfractal.scene.light_tables import Key, LightTable
     from clfractal.scene.textures import Texture
 
 
@@ -242,6 +243,11 @@ class Scene(Section):
             # Other values of materials, as of each frame of a film, show the same pictures.
             if set(texture_files(copied.materials)) <= set(self._read["textures"]):
                 copied._read["textures"] = self._read["textures"]
+        if "lights" in update and "light_tables" in self._read:
+            from clfractal.scene.light_tables import light_files
+
+            if light_files(copied.lights).keys() <= self._read["light_tables"].keys():
+                copied._read["light_tables"] = self._read["light_tables"]
         if "objects" in update and "grids" in self._read:
             from clfractal.scene.object_grids import grid_files
 
@@ -349,6 +355,19 @@ class Scene(Section):
         from clfractal.scene.textures import read_textures
 
         return self.once("textures", lambda: read_textures(self.materials, self.folder))
+
+    @property
+    def light_tables(self) -> "Mapping[Key, LightTable]":
+        """What lights have read of files, by their kinds and the files' names; in a loaded scene it has been checked.
+
+        Raises:
+            FileError: a file is missing or wrong; the path says where it is named.
+        """
+        if not any(light.reads for light in self.lights):
+            return {}
+        from clfractal.scene.light_tables import read_light_tables
+
+        return self.once("light_tables", lambda: read_light_tables(self.lights, self.folder))
 
     @property
     def grids(self) -> "Mapping[str, GivenGrid]":

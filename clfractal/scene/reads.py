@@ -14,6 +14,7 @@ _SECTIONS = {
     "given": "renderer",
     "grids": "objects",
     "textures": "materials",
+    "light_tables": "lights",
 }
 TABLE = "table "
 """What the names of tables begin with, under which a scene keeps them."""

@@ -1,7 +1,8 @@
 """What lights have in common: colour, strength, shadows; and what else is asked of every kind."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from math import radians, sin
+from pathlib import Path
 from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
@@ -65,6 +66,20 @@ class LightBase(Element):
     def stands_at(self) -> Vector | None:
         """Where it stands; None: infinitely far away, or in many places."""
         return None
+
+    @property
+    def reads(self) -> str | None:
+        """The file beside the scene that its table is in, its key `file`; None if it needs none."""
+        return None
+
+    @classmethod
+    def table_of(cls, path: Path) -> Sequence[float]:
+        """Numbers of a file that kernels read, from `light->table` on.
+
+        Raises:
+            FileError: it cannot be read, or is wrong.
+        """
+        raise NotImplementedError(cls.tag)
 
     @property
     def used_color(self) -> Vector:

@@ -17,6 +17,7 @@ from clfractal.files.document import read_document
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.formulas.catalog import safe_path
 from clfractal.scene.layout import LayoutView
+from clfractal.scene.light_tables import light_files, with_light_files
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import grid_files, with_grids
@@ -41,7 +42,7 @@ def formula_files(formula: Any, folder: Path, *, depth: int = 0) -> list[str]:
 
 
 def data_files(scene: Scene) -> list[str]:
-    """Names of the maps, grids and textures of a scene and its views, relative to the scene's folder."""
+    """Names of the maps, grids, textures and tables of lights of a scene and its views, relative to the scene's folder."""
     parts: list[Scene | LayoutView] = [scene, *(scene.layout.views if scene.layout is not None else ())]
     found = []
     for part in parts:
@@ -49,11 +50,12 @@ def data_files(scene: Scene) -> list[str]:
             found.append(part.environment.file)
         if isinstance(part.renderer, VolumeRenderer) and part.renderer.file is not None:
             found.append(part.renderer.file)
+        found += [file for _, file in light_files(part.lights or ())]
     return list(dict.fromkeys([*found, *texture_files(scene.materials), *grid_files(scene.objects)]))
 
 
 def renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
-    """The scene with other names of its maps, grids and textures."""
+    """The scene with other names of its maps, grids, textures and tables of lights."""
     changes = _renamed_parts(scene, names)
     materials = with_textures(scene.materials, names)
     if materials != scene.materials:
@@ -184,6 +186,8 @@ def _renamed_parts(part: Scene | LayoutView, names: Mapping[str, str]) -> dict[s
             and names.get(section.file, section.file) != section.file
         ):
             found[key] = section.model_copy(update={"file": names[section.file]})
+    if part.lights is not None and (lights := with_light_files(part.lights, names)) != part.lights:
+        found["lights"] = lights
     return found
 
 

@@ -20,7 +20,7 @@ INLINE color light_gathered(stage s, const interaction *here, vec to_viewer, cou
         light_record light = w.lights + turn;
         const ray_hit met = queue_met(s.q, turn, s.slot);
         counters_met(cost, met, 0);
-        incidence in = light_at(light, here->point);
+        incidence in = light_at(light, here->point, w.tables);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
         const color more = lit_by(s, here, in, ~mask_of(met.hit), R(1.0), to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));

@@ -36,6 +36,6 @@ INLINE void send_to_small_lights(stage s, const interaction *here, int turns, wo
             continue;
         }
         light_record light = w.lights + turn;
-        send_to_light(s, turn, here, light_at(light, here->point), WHETHER, light->shadow ? found : ~found & found, w);
+        send_to_light(s, turn, here, light_at(light, here->point, w.tables), WHETHER, light->shadow ? found : ~found & found, w);
     }
 }

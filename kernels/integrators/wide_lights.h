@@ -84,10 +84,10 @@ INLINE int turn_ray(stage s, const packet_pixels *at, const interaction *here, i
     }
     light_record light = w.lights + light_index;
     if (ray_of_light >= light->rays) return 0;
-    *in = light_at(light, here->point);
+    *in = light_at(light, here->point, w.tables);
     if (w.settings->soft_lights) {
         in->toward = soft_light(s, at, here->point, in->toward, light_index, ray_of_light, w);
-        if (light->seen) *in = light_along(light, here->point, in->toward);
+        if (light->seen) *in = light_along(light, here->point, in->toward, w.tables);
     }
     if (!light->shadow) *wanted &= ~*wanted;
     return 1;
@@ -149,9 +149,9 @@ INLINE color wide_light_gathered(stage s, const interaction *here, vec to_viewer
         if (number % w.settings->light_rays >= light->rays) continue;
         const ray_hit met = queue_met(s.q, turn, s.slot);
         counters_met(cost, met, 0);
-        incidence in = light_at(light, here->point);
+        incidence in = light_at(light, here->point, w.tables);
         in.toward = queue_ray(s.q, turn, s.slot).direction;
-        if (light->seen) in = light_along(light, here->point, in.toward);
+        if (light->seen) in = light_along(light, here->point, in.toward, w.tables);
         const color more = lit_by(s, here, in, ~mask_of(met.hit), open, to_viewer, light, l, w);
         gathered = color_add(gathered, color_scale(more, (real)(light->share)));
     }

@@ -55,7 +55,7 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
     unit_square((bits)((uint)s.sample), seed, &u, &v);
     scattering found;
     found.t = scattering_place(r, far, u, light, w.material, &weight);
-    found.in = light_at(light, vec_along(r.origin, found.t, r.direction));
+    found.in = light_at(light, vec_along(r.origin, found.t, r.direction), w.tables);
     if (light->spread > S(0.0)) {
         real other;
         unit_square((bits)((uint)s.sample), seed + 1u, &u, &other);

@@ -28,8 +28,8 @@ INLINE mask light_met_at(light_record light, vec origin, vec direction, real *di
 }
 
 // Light from one of the directions that `light_direction` finds: the mean over these is the light's.
-INLINE incidence light_along(light_record light, vec point, vec direction) {
-    incidence in = light_at(light, point);
+INLINE incidence light_along(light_record light, vec point, vec direction, __global const float *tables) {
+    incidence in = light_at(light, point, tables);
     in.toward = direction;
     if (light->seen) {
         in.strength = pick(less(R(0.0), in.strength), (real)(light->intensity) / (LIGHT_PI * light_density(light, point, direction)), R(0.0));
@@ -39,9 +39,9 @@ INLINE incidence light_along(light_record light, vec point, vec direction) {
 }
 
 // About the irradiance that a light can bring to a point.
-CALLED real light_weight(light_record light, const vec *point) {
+CALLED real light_weight(light_record light, const vec *point, __global const float *tables) {
     const color c = color_splat(light->color);
-    return LIGHT_PI * light_at(light, *point).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
+    return LIGHT_PI * light_at(light, *point, tables).strength * (R(0.2126) * c.r + R(0.7152) * c.g + R(0.0722) * c.b);
 }
 
 // The same as below, of the lights on a set.
@@ -60,7 +60,7 @@ CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, r
         *far = pick(here, distance, *far);
         *shows = color_pick(here, color_scale(color_splat(light->color), (real)(light->intensity)), *shows);
         *density = pick(here, light_density(light, *origin, *direction), *density);
-        *weight = pick(here, light_weight(light, origin), *weight);
+        *weight = pick(here, light_weight(light, origin, w.tables), *weight);
     }
     return met | met_on_set(*origin, *direction, of_eye, far, shows, density, weight, w);
 }

@@ -9,7 +9,7 @@ INLINE void sample_lights_beside(choosing *c, const real *numbers, world w);
 // object lights itself.
 INLINE real weight_of_all(vec point, real own, world w) {
     real sum = (real)(w.settings->environment_weight);
-    for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, &point);
+    for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, &point, w.tables);
     sum = with_lights_beside(sum, point, own, w);
     return fmax(sum, (real)(REAL_SMALLEST));
 }
@@ -25,7 +25,7 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
     for (int i = 0; i < w.settings->light_count; ++i) {
         const mask met = light_met(w.lights + i, direction);
         if (!any_lane(met)) continue;
-        const real of_light = light_weight(w.lights + i, &from) / total * light_density(w.lights + i, from, direction);
+        const real of_light = light_weight(w.lights + i, &from, w.tables) / total * light_density(w.lights + i, from, direction);
         const real share = pick(less(density, R(0.0)), R(1.0), power_share(density, of_light));
         sum = color_pick(met, color_add(sum, color_scale(light_shown(w.lights + i), share)), sum);
     }
@@ -42,12 +42,12 @@ INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own,
     for (int i = 0; i <= w.settings->light_count; ++i) {
         const int is_light = i < w.settings->light_count;
         __constant const struct Light *light = w.lights + (is_light ? i : 0);
-        const real weight = is_light ? light_weight(light, &from) : (real)(w.settings->environment_weight);
+        const real weight = is_light ? light_weight(light, &from, w.tables) : (real)(w.settings->environment_weight);
         const mask here = is_chosen(&c, weight);
         if (!any_lane(here)) continue;
         light_ray r;
         if (is_light) {
-            r = light_sample(light, light->seen ? from : point, u, v);
+            r = light_sample(light, light->seen ? from : point, u, v, w.tables);
         } else {
             if (!has_environment(w.material)) continue;
             r.toward = environment_sample(u, v, w.material, w.environment, &r.density);

@@ -10,8 +10,8 @@ typedef struct {
     real density;
 } light_ray;
 
-INLINE light_ray light_sample(__constant const struct Light *light, vec point, real u, real v) {
-    const incidence in = light_at(light, point);
+INLINE light_ray light_sample(__constant const struct Light *light, vec point, real u, real v, __global const float *tables) {
+    const incidence in = light_at(light, point, tables);
     light_ray r;
     r.distance = in.distance;
     r.toward = in.toward;

@@ -46,6 +46,7 @@ kernels/*/emitter*.h: render/emitter_places render/emitters
 kernels/geometry/rectangles.h: render/rectangles render/emitter_places render/light_shapes
 kernels/shading/light_sampling.h: render/emitters render/light_shapes render/paths
 kernels/shading/incidence.h: render/light_shapes render/surface_light
+kernels/shading/light_at.h: render/light_shapes render/surface_light
 kernels/elements/lights/*: render/light_shapes render/surface_light render/rectangles
 kernels/shading/media.h: render/glass_objects
 kernels/integrators/glass_paths.h: render/glass_paths render/glass_objects

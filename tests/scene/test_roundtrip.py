@@ -252,7 +252,7 @@ def test_every_key_but_three_has_a_default() -> None:
     assert (scene.image.width, scene.image.height) == (1024, 1024)
     assert scene.camera.projection == "perspective"
     assert (scene.camera.position, scene.camera.target, scene.camera.up) == ((0, -3, 0), (0, 0, 0), (0, 0, 1))
-    assert [light.type for light in scene.lights] == ["directional"]
+    assert [light.tag for light in scene.lights] == ["directional"]
     assert scene.output.half_channels >= {"R", "G", "B", "A"}
     assert "Z" not in scene.output.half_channels
     assert set(schema()["required"]) == {"version", "formula", "camera"}

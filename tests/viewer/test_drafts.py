@@ -47,7 +47,7 @@ def test_a_draft_has_the_lights_and_nothing_that_takes_long() -> None:
     found = draft(scene)
     assert isinstance(found.lighting, DirectLighting)
     assert found.fog is None
-    assert [(light.type, light.shadow) for light in found.lights] == [("sphere", False)]
+    assert [(light.tag, light.shadow) for light in found.lights] == [("sphere", False)]
     assert (found.formula, found.camera) == (scene.formula, scene.camera)
     assert (found.material.color, found.coloring.by) == ((0.8, 0.05, 0.05), "solid")
     # What the eye sees by the light of a sky is lit from the eye, as bright as the exposure wants.

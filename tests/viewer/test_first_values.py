@@ -14,6 +14,7 @@ from clfractal.camera.views import scene_view
 from clfractal.engine.engine import Engine
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from clfractal.schema.kinds import members
 from clfractal.schema.shape import solids
 from clfractal.viewer.editing import edited
 from clfractal.viewer.panels import first, lights
@@ -39,6 +40,7 @@ BELOW = ("camera.position=[0, -3.2, -2.2]",)
 FLAT = ("camera={position: [0, -4, 0.6], projection: orthographic, height: 3}",)
 ASIDE = ("camera.target=[-3, 0, 0]",)
 BESIDE = ("objects.ball={type: sphere, position: [1.6, 0, 0], radius: 0.3}",)
+PLACED = [kind.tag for kind in members("lights") if "position" in kind.model_fields]
 VIEWS = pytest.mark.parametrize(
     "view", [(), NEAR, BELOW, FLAT, ASIDE], ids=["", "near", "below", "flat", "aside"]
 )
@@ -146,7 +148,7 @@ def _light(engine: Engine, scene: Scene, light: dict[str, Any]) -> npt.NDArray[n
     return np.asarray(colors.mean(axis=-1) * covered, np.float64)
 
 
-@pytest.mark.parametrize("kind", ["directional", "point", "spot", "sphere", "rectangle", "set"])
+@pytest.mark.parametrize("kind", lights.KINDS)
 @pytest.mark.parametrize("view", [(), NEAR, BESIDE], ids=["", "near", "beside a ball"])
 def test_a_new_light_lights_what_is_seen(
     engine: Engine, monkeypatch: pytest.MonkeyPatch, kind: str, view: tuple[str, ...]
@@ -163,7 +165,7 @@ def test_a_new_light_lights_what_is_seen(
     assert 0.1 < found[lit].mean() / usual[lit].mean() < 3
 
 
-@pytest.mark.parametrize("kind", ["point", "spot", "sphere", "rectangle"])
+@pytest.mark.parametrize("kind", PLACED)
 @VIEWS
 def test_a_new_light_stands_where_it_is_seen(
     engine: Engine, monkeypatch: pytest.MonkeyPatch, kind: str, view: tuple[str, ...]
@@ -182,7 +184,7 @@ def test_a_new_light_stands_where_it_is_seen(
         assert float(np.asarray(film["R"]).max()) > 0.5 * light["intensity"]
 
 
-@pytest.mark.parametrize("kind", ["spot", "sphere", "rectangle"])
+@pytest.mark.parametrize("kind", [kind for kind in PLACED if kind != "point"])
 def test_a_light_of_another_kind_gives_as_much_light(
     engine: Engine, monkeypatch: pytest.MonkeyPatch, kind: str
 ) -> None:
@@ -192,7 +194,7 @@ def test_a_light_of_another_kind_gives_as_much_light(
         ui.studio.scene, {"lights": [{**first.light(ui, "point"), "intensity": 2.0, "shadow": False}]}
     )
     after = {**first.light(ui, kind, scene.lights[0]), "shadow": False}
-    assert after["position"] == list(scene.lights[0].position)  # type: ignore[union-attr]
+    assert after["position"] == list(scene.lights[0].stands_at or ())
     before = _light(engine, scene, scene.lights[0].model_dump(mode="json"))
     found = _light(engine, scene, after)
     # The middle of the picture is what it looks at.
@@ -206,7 +208,7 @@ def test_lights_are_added_from_a_list_and_their_kinds_are_read_whole(monkeypatch
     stage = Stage(ui, lights.draw)
     for kind in lights.KINDS:
         lights._add(ui, kind, [{"direction": [0.5, 1, -0.6]}])
-        assert ui.studio.scene.lights[1].type == kind, ui.studio.problems
+        assert ui.studio.scene.lights[1].tag == kind, ui.studio.problems
     assert "lights" in ui.show  # where they are is shown
     seen.fresh(stage)
     cut = [text for text in lights.KINDS.values() if text not in drawn(stage)]
@@ -237,7 +239,7 @@ def test_set_lights_are_possible_on_every_set(engine: Engine) -> None:
         scene = load_scene({"version": 1, "formula": {"name": name, "iterations": 6}, "camera": {}})
         ui, _ = make_ui(scene)
         lights._add(ui, "set", [])
-        assert [light.type for light in ui.studio.scene.lights] == ["set"], ui.studio.problems
+        assert [light.tag for light in ui.studio.scene.lights] == ["set"], ui.studio.problems
 
 
 def test_objects_are_added_by_their_buttons(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -13,7 +13,7 @@ INLINE real spot_shows(light_record light, vec toward) {
     return t * t * (R(3.0) - R(2.0) * t);
 }
 
-INLINE incidence spot_light(light_record light, vec point) {
+INLINE incidence spot_light(light_record light, vec point, __global const float *tables) {
     incidence in = light_from_place(light, point);
     in.strength *= spot_shows(light, in.toward);
     return in;

@@ -23,11 +23,11 @@ INLINE ray sample_ray(const packet_pixels *at, real across, real below, int samp
                        __global const uchar *values3, __global const uchar *normals0, __global const uchar *normals1,       \
                        __global const uchar *normals2, __global const uchar *normals3,                                      \
                        orbit_record orbits, constants k, __global const float *bounds,     \
-                       __global const float *environment, plane_record planes,                           \
+                       __global const float *environment, __global const float *tables, plane_record planes,               \
                        __global const float *plane_palettes, PASS_SPAN) {                                                   \
         const grid voxels = {about, table, blocks, {values0, values1, values2, values3}, {normals0, normals1, normals2, normals3}}; \
         const plane_set set = {planes, orbits, k, plane_palettes, 0, settings->plane_count};                                \
-        const world w = {view, settings, material, lights, transfer, voxels, sampling, orbits, k, bounds, environment, set}; \
+        const world w = {view, settings, material, lights, transfer, voxels, sampling, orbits, k, bounds, environment, tables, set}; \
         const pass span = PASS;                                                                                             \
         render_packet((int)get_global_id(0) + first_packet, (int)get_global_id(1), span, w);                                \
     }

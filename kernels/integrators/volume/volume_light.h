@@ -26,7 +26,7 @@ INLINE color lit(vec point, vec normal, color tint, vec to_viewer, mask active, 
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->light_count; ++i) {
         light_record light = w.lights + i;
-        const incidence in = light_at(light, point);
+        const incidence in = light_at(light, point, w.tables);
         const mask all_lanes = equal(R(0.0), R(0.0));
         const color open = phong(tint, normal, to_viewer, in, all_lanes, R(1.0), light, w.material);
         if (!w.settings->shadows) {

@@ -11,6 +11,7 @@ typedef struct {
     constants k;
     __global const float *bounds;        // along paths: of each stored brick the most extinction that may be met in it ...
     __global const float *environment;   // ... and see environment.h
+    __global const float *tables;        // of lights
     plane_set planes;
 } world;
 
