@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from clfractal.device.orbit import SHAPE_KINDS
 from clfractal.device.source import kinds
 from clfractal.files.resources import folder
-from clfractal.integrators.lights import LIGHT_KINDS
 from clfractal.schema.kinds import members
 from clfractal.schema.light import SingleLight
 from clfractal.schema.shape import solids
+from clfractal.shading.light_records import LIGHT_KINDS
 
 MOST_LINES = 80
 # A function's or a kernel's name, at the left; its body begins on the same line or a few lines below.

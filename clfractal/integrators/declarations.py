@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from clfractal.device.orbit import ORBIT
 from clfractal.geometry.objects import OBJECT
-from clfractal.integrators.lights import LIGHT
 from clfractal.integrators.march import MARCH
 from clfractal.integrators.passes import SAMPLING
 from clfractal.integrators.records import MATERIAL, VIEW
 from clfractal.shading.kind_numbers import kind_text
+from clfractal.shading.light_records import LIGHT
 from clfractal.shading.maps import MAP
 from clfractal.shading.materials import PBR
 

@@ -13,7 +13,6 @@ from clfractal.geometry.fineness import Fineness
 from clfractal.geometry.object_grids import clouds_of
 from clfractal.geometry.planes import plane_count
 from clfractal.geometry.solids import has_hollows
-from clfractal.integrators.lights import light_rays, single_lights
 from clfractal.integrators.records import bounces, environment_weight, firefly_limit, hemisphere_rays
 from clfractal.integrators.state import PARTS, along_paths, normal_count
 from clfractal.integrators.waves import meets_objects, met_numbers
@@ -22,6 +21,7 @@ from clfractal.scene.model import Scene
 from clfractal.shading.emitters import sampled_radiance
 from clfractal.shading.environment import PackedEnvironment
 from clfractal.shading.kind_numbers import FEATURES, NORMALS
+from clfractal.shading.light_records import light_rays, single_lights
 from clfractal.shading.maps import has_bump, has_glass, has_glass_set, has_subsurface, material_counts
 from clfractal.shading.set_lights import SetLights, march_fields
 

@@ -27,7 +27,6 @@ from clfractal.integrators.kernel import (
     WaveNeeds,
     flat_text,
 )
-from clfractal.integrators.lights import light_records, light_tables, tables_key
 from clfractal.integrators.march import march_record
 from clfractal.integrators.passes import pass_defines
 from clfractal.integrators.path_state import path_state_text
@@ -45,6 +44,7 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.shading.environment import packed_map
 from clfractal.shading.glass import glass_tables
+from clfractal.shading.light_records import light_records, light_tables, tables_key
 from clfractal.shading.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
 from clfractal.shading.materials import PBR, pbr_text, scattering_defines
 from clfractal.shading.scattering import albedo_tables

@@ -19,7 +19,6 @@ from clfractal.geometry.planes import CUT_PLANE, plane_count, plane_palettes, pl
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
 from clfractal.integrators.kernel import KernelArgument, ProgramText, Stage, TileKernel, flat_text
-from clfractal.integrators.lights import LIGHT, light_records, light_tables, tables_key
 from clfractal.integrators.passes import SAMPLING, pass_defines
 from clfractal.integrators.path_state import path_state_text
 from clfractal.integrators.plan import Plan
@@ -31,6 +30,7 @@ from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shading.environment import PackedEnvironment, packed_map
 from clfractal.shading.kind_numbers import kind_text
+from clfractal.shading.light_records import LIGHT, light_records, light_tables, tables_key
 from clfractal.shading.transfer import (
     MOST_OPACITY,
     SHINING_RATE,

@@ -30,12 +30,12 @@ from clfractal.geometry.object_grids import clouds_of
 from clfractal.geometry.planes import has_faces
 from clfractal.geometry.solids import joins_smoothly
 from clfractal.integrators.kernel import MET_NUMBERS, Over, Stage
-from clfractal.integrators.lights import light_rays, single_lights
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.records import bounces, hemisphere_rays
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.shading.light_records import light_rays, single_lights
 from clfractal.shading.maps import (
     MappedMaterials,
     asked_maps,

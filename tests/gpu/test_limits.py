@@ -9,9 +9,9 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
-from clfractal.integrators.lights import LIGHT
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.lighting import MAX_LIGHTS
+from clfractal.shading.light_records import LIGHT
 from tests.gpu import limits
 
 ENTRY = ".entry kernel_a(\n{}\n)\n{{\n}}\n"

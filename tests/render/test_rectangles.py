@@ -11,7 +11,7 @@ from scipy.stats import chi2, qmc
 
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
-from clfractal.integrators.lights import LIGHT
+from clfractal.shading.light_records import LIGHT
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = f"""\
