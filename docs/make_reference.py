@@ -1,4 +1,4 @@
-"""Makes the tables of keys in docs/*.md of what the schema declares, and the sections of kinds of shapes and lights.
+"""Makes the tables of keys in docs/*.md of what the schema declares, and the sections of shapes, lights, materials.
 
 python docs/make_reference.py
 
@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from clfractal.scene.load import schema
+from clfractal.scene.materials import PARTS
 from clfractal.schema.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.schema.kinds import members
 from clfractal.schema.shape import solids
@@ -25,6 +26,7 @@ DOCS = Path(__file__).resolve().parent
 HEAD = "| key | default | allowed | meaning |\n|---|---|---|---|\n"
 _TABLE = re.compile(r"^<!-- keys of (\w+) -->\n\n(?:\|.*\n)*", re.MULTILINE)
 _KINDS = re.compile(r"(?<=<!-- )(solids|lights)( -->\n).*(?=<!-- end of \1 -->)", re.DOTALL)
+_PARTS = re.compile(r"(?<=<!-- parts -->\n).*(?=<!-- end of parts -->)", re.DOTALL)
 # Words of descriptions as pages write them.
 _LINKS = {
     "`materials`": "[`materials`](paths.md#materials)",
@@ -36,6 +38,7 @@ _LINKS = {
 def made(page: str) -> str:
     """A page's text with the tables and sections that the schema says."""
     found = _TABLE.sub(lambda table: _table(table[1], table[0]), page)
+    found = _PARTS.sub(lambda parts: "\n" + "".join(_part_sections(parts[0])), found)
     return _KINDS.sub(lambda block: f"{block[1]}{block[2]}\n" + "".join(_sections(block[1], block[0])), found)
 
 
@@ -85,6 +88,15 @@ def _sections(family: str, before: str) -> Iterator[str]:
         if (DOCS / "pictures" / f"{folder}_{kind.tag}.webp").exists():
             yield f"![{about}](pictures/{folder}_{kind.tag}.webp)\n\n"
         yield _table(kind.__name__, tables.get(kind.__name__, "")) + "\n"
+
+
+def _part_sections(before: str) -> Iterator[str]:
+    """Of each part of materials the section that is there, or what its class says, and its keys."""
+    there = {text.partition("\n")[0]: text for text in before.split("### ")[1:]}
+    for part in PARTS:
+        about = " ".join((inspect.getdoc(part) or "").split())
+        text = there.get(part.tag) or f"{part.tag}\n\n{about}\n\n{_table(part.__name__)}\n"
+        yield f"### {text}"
 
 
 @cache

@@ -12,12 +12,13 @@ from clfractal.device.structs import Field, Precision, Struct
 from clfractal.geometry.object_grids import NO_GRID, ObjectGrids, grid_defines
 from clfractal.geometry.water import WAVES, wave_set
 from clfractal.scene.blends import is_glass
-from clfractal.scene.materials import WHITE, PbrMaterial
+from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
 from clfractal.schema.base import Vector, frame_of, length
 from clfractal.schema.mapped import Map
+from clfractal.schema.material import WHITE
 from clfractal.schema.shape import AXES, Level, ObjectBase, Simple, Solid
 from clfractal.shading.emitters import sampled_radiance
 from clfractal.shading.maps import MappedMaterials, glass_bodies

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.materials import BLACK, PbrMaterial
-from clfractal.schema.mapped import Map
+from clfractal.scene.materials import PbrMaterial
+from clfractal.schema.material import BLACK
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,27 +49,30 @@ def blends_of(roots: Sequence[PbrMaterial], named: Mapping[str, PbrMaterial]) ->
     return Blends(tuple(order), parts, tuple(numbers[id(root)] for root in roots))
 
 
+def made_of(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> Iterator[PbrMaterial]:
+    """A material, or those with layers that it is blended of; references have been checked."""
+    if material.blend is None:
+        yield material
+    for name in material.blend or ():
+        yield from made_of(named[name], named)
+
+
 def is_glass(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
-    """Whether light may go through a material, or through a part of what it is blended of; references have been checked."""
-    if material.blend is not None:
-        return any(is_glass(named[name], named) for name in material.blend)
-    weight = material.transmission.weight
-    return isinstance(weight, Map) or weight > 0
+    """Whether light may go through a material, or through a part of what it is blended of; likewise."""
+    return any(each.transmission.has("weight") for each in made_of(material, named))
 
 
 def is_subsurface(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     """Whether light may go below a material's boundary, or that of a part of what it is blended of; likewise."""
-    if material.blend is not None:
-        return any(is_subsurface(named[name], named) for name in material.blend)
-    weight = material.subsurface.weight
-    return isinstance(weight, Map) or weight > 0
+    return any(each.subsurface.has("weight") for each in made_of(material, named))
 
 
 def is_participating(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     """Whether a material, or a part of what it is blended of, scatters light on its way through; likewise."""
-    if material.blend is not None:
-        return any(is_participating(named[name], named) for name in material.blend)
-    return is_glass(material, named) and material.transmission.scatter != BLACK
+    return any(
+        each.transmission.has("weight") and each.transmission.scatter != BLACK
+        for each in made_of(material, named)
+    )
 
 
 def check_blends(named: Mapping[str, PbrMaterial]) -> None:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from clfractal.device.structs import Field, Struct
-from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.materials import PARTS, PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
 from clfractal.schema.mapped import Map
@@ -17,45 +19,21 @@ from clfractal.shading.scattering import (
     SMOOTHEST_PARTS,
 )
 
+PARAMETERS = tuple(parameter for part in PARTS for parameter in part.parameters())
+"""What a material has in each lane, in the order of its numbers there."""
+
+
+def _fields() -> Iterator[Field]:
+    for each in PARAMETERS:
+        yield Field(each.name, "real", each.count if each.count > 1 else 0, each.meaning)
+        if each.optional:
+            yield Field(f"{each.name}_own", "int", 0, "1: it is that; 0: the colouring's")
+
+
 PBR = Struct(
     "Pbr",
     [
-        Field("base_weight", "real", 0, "factor on the colour"),
-        Field("base_color", "real", 3, "linear Rec. 709"),
-        Field("base_own", "int", 0, "1: the body has this colour; 0: the colouring's"),
-        Field("base_metalness", "real", 0, "0: a dielectric, 1: a metal"),
-        Field("base_diffuse_roughness", "real", 0, "EON's, 0 to 1"),
-        Field("specular_weight", "real", 0, "factor on a dielectric's reflectance, straight on"),
-        Field("specular_color", "real", 3, "a dielectric's tint, a metal's at the edge"),
-        Field("specular_roughness", "real", 0, "0 to 1"),
-        Field("specular_ior", "real", 0, "1 or more"),
-        Field("coat_weight", "real", 0, "part of the surface with a coat"),
-        Field("coat_color", "real", 3, "what passes there and back"),
-        Field("coat_roughness", "real", 0, "0 to 1"),
-        Field("coat_ior", "real", 0, "1 or more"),
-        Field("coat_darkening", "real", 0, "0 to 1"),
-        Field("fuzz_weight", "real", 0, "0 to 1"),
-        Field("fuzz_color", "real", 3, "linear Rec. 709"),
-        Field("fuzz_roughness", "real", 0, "SMOOTHEST_FUZZ to 1"),
-        Field(
-            "emission_luminance",
-            "real",
-            0,
-            "factor on the colour, where that differs from place to place; else 1",
-        ),
-        Field("emission_color", "real", 3, "radiance, linear Rec. 709"),
-        Field("transmission_weight", "real", 0, "part of the body that is glass"),
-        Field("transmission_color", "real", 3, "what is left of light after the depth"),
-        Field("transmission_depth", "real", 0, "scene units; 0: the colour tints the boundary"),
-        Field("transmission_scatter", "real", 3, "scattered on that way, in mean free paths"),
-        Field("transmission_scatter_anisotropy", "real", 0, "Henyey and Greenstein's g"),
-        Field("transmission_dispersion_scale", "real", 0, "0 to 1"),
-        Field("transmission_dispersion_abbe_number", "real", 0, "1 or more"),
-        Field("subsurface_weight", "real", 0, "part of the diffuse body that is a medium"),
-        Field("subsurface_color", "real", 3, "what comes out of a thick body"),
-        Field("subsurface_radius", "real", 0, "mean free path, scene units"),
-        Field("subsurface_radius_scale", "real", 3, "factor on that"),
-        Field("subsurface_scatter_anisotropy", "real", 0, "Henyey and Greenstein's g"),
+        *_fields(),
         Field("first_map", "int", 0, "of the parameters that differ from place to place"),
         Field("map_count", "int", 0, ""),
         Field(
@@ -74,16 +52,14 @@ PBR = Struct(
         ),
     ],
 )
-PARAMETERS = tuple(field for field in PBR.fields if field.type == "real" and field.name != "bump_width")
-"""What a material has in each lane, in the order of its numbers there."""
 
 
 def parameter_numbers() -> dict[str, tuple[int, int]]:
     """Of each parameter by its name in `PBR` the place of its first number in a lane's material, and how many it has."""
     found, place = {}, 0
-    for field in PARAMETERS:
-        found[field.name] = (place, max(field.count, 1))
-        place += max(field.count, 1)
+    for each in PARAMETERS:
+        found[each.name] = (place, each.count)
+        place += each.count
     return found
 
 
@@ -93,40 +69,41 @@ MORE_NUMBERS = 3
 
 def matter_numbers() -> int:
     """Numbers of a material in a lane."""
-    return sum(max(field.count, 1) for field in PARAMETERS) + MORE_NUMBERS
+    return sum(each.count for each in PARAMETERS) + MORE_NUMBERS
 
 
 def pbr_text() -> str:
-    """The type of a lane's material, and how one begins as a record: the same everywhere (`bsdf.h`)."""
-    kinds = {0: "real", 3: "color"}
+    """The type of a lane's material, how one begins as a record, and a matt one: the same everywhere (`bsdf.h`)."""
+    reads = {"real": "(real)(m->{})", "color": "color_splat(m->{})", "vec": "vec_splat(m->{})"}
     lines = [
         "// The parameters of a material at an interaction, which may differ from lane to lane.",
         "typedef struct {",
-    ]
-    lines += [f"    {kinds[field.count]} {field.name};" for field in PARAMETERS]
-    lines += [
+        *(f"    {each.kind} {each.name};" for each in PARAMETERS),
         "    real inside;        // whether the viewer is inside the glass",
         "    real bending_ior;   // the index that bends light, of one colour of it",
         "    real emerges;       // whether light comes from below the boundary",
         "} pbr;",
         "// `tint`: the colouring's colour.",
+        "INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {",
+        "    pbr p;",
     ]
-    lines += ["INLINE pbr pbr_of(__constant const struct Pbr *m, color tint) {", "    pbr p;"]
-    for field in PARAMETERS:
-        read = f"color_splat(m->{field.name})" if field.count else f"(real)(m->{field.name})"
-        own = f"m->base_own ? {read} : tint" if field.name == "base_color" else read
-        lines.append(f"    p.{field.name} = {own};")
-    return "\n".join(
-        [
-            *lines,
-            "    p.inside = R(0.0);",
-            "    p.bending_ior = p.specular_ior;",
-            "    p.emerges = R(0.0);",
-            "    return p;",
-            "}",
-            "",
-        ]
-    )
+    for each in PARAMETERS:
+        read = reads[each.kind].format(each.name)
+        own = f"m->{each.name}_own ? {read} : tint" if each.optional else read
+        lines.append(f"    p.{each.name} = {own};")
+    lines += [
+        "    p.inside = R(0.0);",
+        "    p.bending_ior = p.specular_ior;",
+        "    p.emerges = R(0.0);",
+        "    return p;",
+        "}",
+        "// Leaves nothing but a matt body.",
+        "INLINE void pbr_matt(pbr *p) {",
+        *(f"    p->{part.tag}_{name} = R(0.0);" for part in PARTS for name in part.zero_if_matt),
+        "}",
+        "",
+    ]
+    return "\n".join(lines)
 
 
 def scattering_defines() -> dict[str, object]:
@@ -148,18 +125,20 @@ def of_phong(material: Material) -> PbrMaterial:
     """What Phong's material is along paths: its highlight becomes a dielectric's boundary of about the same width."""
     # cos^n is as wide as GGX with alpha^2 = 2 / (n + 2) (Walter and others 2007), and roughness is the root of alpha.
     roughness = min((2 / (material.shininess + 2)) ** 0.25, 1.0)
-    return PbrMaterial.model_validate(
+    found: PbrMaterial = PbrMaterial.model_validate(
         {
             "base": {"weight": min(material.diffuse, 1.0)},
             "specular": {"weight": min(material.specular, 1.0), "roughness": roughness},
         }
     )
+    return found
 
 
 def used_material(scene: Scene) -> PbrMaterial:
     """The material of a scene's surface along paths: the one that it names, or what Phong's is there."""
     name = scene.material.name
-    return scene.materials[name] if name is not None else of_phong(scene.material)
+    found: PbrMaterial = scene.materials[name] if name is not None else of_phong(scene.material)
+    return found
 
 
 def used_materials(scene: Scene) -> list[PbrMaterial]:
@@ -171,22 +150,15 @@ def used_materials(scene: Scene) -> list[PbrMaterial]:
 
 def material_values(material: PbrMaterial) -> dict[str, object]:
     """The fields of a record."""
-    values: dict[str, object] = {}
-    for part in ("base", "specular", "coat", "fuzz", "transmission", "subsurface"):
-        section = getattr(material, part)
-        for name in type(section).model_fields:
-            values[f"{part}_{name}"] = getattr(section, name)
-    values["base_own"] = int(material.base.color is not None)
-    luminance, color = material.emission.luminance, material.emission.color
-    if isinstance(luminance, Map) or isinstance(color, Map):
-        values |= {"emission_luminance": luminance, "emission_color": color}
-    else:
-        values |= {"emission_luminance": 1.0, "emission_color": tuple(luminance * part for part in color)}
-    values |= {"first_map": 0, "map_count": 0, "blend": (-1, -1), "mask": -1}
+    values: dict[str, object] = {"first_map": 0, "map_count": 0, "blend": (-1, -1), "mask": -1}
     values |= {"bump": -1, "bump_width": -1.0}
-    # What differs from place to place is put in where it is known.
-    sizes = {field.name: field.count for field in PARAMETERS}
-    for name, value in values.items():
-        if value is None or isinstance(value, Map):
-            values[name] = (0.0,) * sizes[name] if sizes[name] else 0.0
+    for part in PARTS:
+        packed = getattr(material, part.tag).packed()
+        for each in part.parameters():
+            value = packed[each.name.removeprefix(f"{part.tag}_")]
+            if each.optional:
+                values[f"{each.name}_own"] = int(value is not None)
+            # What differs from place to place is put in where it is known.
+            unknown = value is None or isinstance(value, Map)
+            values[each.name] = (0.0 if each.count == 1 else (0.0,) * each.count) if unknown else value
     return values

@@ -78,13 +78,11 @@ CALLED pbr pbr_at(stage s, const interaction *here, world w) {
 // The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
 INLINE void pbr_of_face(const interaction *here, pbr *p) {
     const mask face = on_face(here);
-    const real none = R(0.0), one = R(1.0);
-    const color tint = color_of(fmin(here->tint.r, one), fmin(here->tint.g, one), fmin(here->tint.b, one));
+    const real one = R(1.0);
     pbr matt = *p;
-    matt.base_color = tint;
+    pbr_matt(&matt);
     matt.base_weight = one;
-    matt.base_metalness = matt.base_diffuse_roughness = matt.specular_weight = matt.coat_weight = matt.fuzz_weight = none;
-    matt.transmission_weight = matt.emission_luminance = matt.subsurface_weight = none;
+    matt.base_color = color_of(fmin(here->tint.r, one), fmin(here->tint.g, one), fmin(here->tint.b, one));
     *p = pbr_pick(face, matt, *p);
 }
 

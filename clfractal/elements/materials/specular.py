@@ -1,0 +1,20 @@
+"""What the boundary of the body mirrors."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from clfractal.schema.fields import Usual
+from clfractal.schema.mapped import FractionMap, ReflectanceMap
+from clfractal.schema.material import WHITE, IorMap, Part
+
+
+class Specular(Part):
+    """What the body's boundary mirrors."""
+
+    tag = "specular"
+    place = 20
+    weight: FractionMap = Field(1.0, description="factor on the reflectance of a dielectric, straight on")
+    color: ReflectanceMap = Field(WHITE, description="a dielectric's tint; a metal's at its edges")
+    roughness: FractionMap = Field(0.3, description="0: a mirror, 1: no highlight")
+    ior: Annotated[IorMap, Usual(1, 3)] = Field(1.5, description="index of refraction of a dielectric")
