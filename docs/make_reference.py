@@ -95,8 +95,11 @@ def _part_sections(before: str) -> Iterator[str]:
     there = {text.partition("\n")[0]: text for text in before.split("### ")[1:]}
     for part in PARTS:
         about = " ".join((inspect.getdoc(part) or "").split())
-        text = there.get(part.tag) or f"{part.tag}\n\n{about}\n\n{_table(part.__name__)}\n"
-        yield f"### {text}"
+        yield "### " + (there.get(part.tag) or f"{part.tag}\n\n{about}\n\n{_table(part.__name__)}\n")
+        for name, field in part.model_fields.items():
+            picture = f"pictures/{part.tag}_{name}.webp"
+            if (DOCS / picture).exists() and picture not in there.get(part.tag, ""):
+                yield f"![{field.description}]({picture})\n\n"
 
 
 @cache

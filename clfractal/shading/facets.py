@@ -10,7 +10,7 @@ after more, are two lobes
 which have a direction, are the same both ways, and have all that light. Their colour is that of the first facet and of the
 last one, by the directions o and i, and of those between, by the roughness. A metal reflects straight + (1 - straight) a -
 dip b there, where a is the mean of (1 - cosine)^5 and b that of cosine (1 - cosine)^6 (`fresnel_metal` of
-`kernels/shading/microfacets.h`).
+`kernels/elements/materials/base.h`).
 """
 
 from __future__ import annotations

@@ -1,6 +1,7 @@
 """Glass as paths read it: tables of what rough glass reflects and refracts in all, and of wavelengths.
 
-They follow those of `scattering.py` in the buffer, and the kernels `bsdf_glass.h` and `glass_paths.h` read them:
+They follow those of `scattering.py` in the buffer, and `elements/materials/transmission.h` and `glass_paths.h` of the
+kernels read them:
 
     glass seen from outside   [REFLECTANCES][ROUGHNESSES][COSINES + 1]
     glass seen from inside    [REFLECTANCES][ROUGHNESSES][COSINES + 1]

@@ -17,6 +17,7 @@ from clfractal.shading.scattering import (
     ROUGHNESSES,
     SMOOTHEST_FUZZ_PARTS,
     SMOOTHEST_PARTS,
+    albedo_tables,
 )
 
 PARAMETERS = tuple(parameter for part in PARTS for parameter in part.parameters())
@@ -113,6 +114,7 @@ def scattering_defines() -> dict[str, object]:
         "ALBEDO_COSINES": COSINES,
         "ALBEDO_ROUGHNESSES": ROUGHNESSES,
         "ALBEDO_REFLECTANCES": REFLECTANCES,
+        "ALBEDO_ALL": albedo_tables().size,
         "SMOOTHEST_PARTS": SMOOTHEST_PARTS,
         "SMOOTHEST_FUZZ_PARTS": SMOOTHEST_FUZZ_PARTS,
         "REPEATED_EVEN_HUNDREDTHS": EVEN_HUNDREDTHS,

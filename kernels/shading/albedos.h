@@ -7,7 +7,7 @@
 #define ALBEDO_FUZZ (REPEATED_TABLES * ALBEDO_TABLE)
 #define ALBEDO_DIELECTRIC (ALBEDO_FUZZ + ALBEDO_TABLE)
 // With glass (`clfractal/shading/glass.py`): rough glass, seen from outside and from inside; wavelengths.
-#define ALBEDO_GLASS (ALBEDO_DIELECTRIC + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
+#define ALBEDO_GLASS ALBEDO_ALL   // behind all others
 #define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 #define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 

@@ -63,8 +63,8 @@ CALLED void scatter_value(const bsdf *b, const vec *direction, __global const fl
 INLINE vec bumped_direction(const bsdf *b, vec toward, real choice, real wall) {
     const mask apart = ~same_side(vec_dot(toward, b->normal), vec_dot(toward, b->surface));
     toward = vec_pick(apart, mirrored_across(toward, b->surface), toward);
-    real fades = pick(less(choice, b->by_coat + b->by_gloss), b->alpha * b->alpha, R(1.0));
-    fades = pick(less(choice, b->by_coat), b->coat_alpha * b->coat_alpha, fades);
+    real fades = pick(less(choice, b->by_coat + b->by_gloss), b->facets.alpha * b->facets.alpha, R(1.0));
+    fades = pick(less(choice, b->by_coat), b->coat_facets.alpha * b->coat_facets.alpha, fades);
     const real before = b->by_coat + b->by_gloss;
     fades = pick(less_equal(before, choice) & less(choice, before + b->by_glass + b->by_beyond), R(0.0), fades);
     const mask leans = less(R(0.0), vec_dot(toward, b->surface)) & less(R(0.0), vec_dot(toward, b->leans));

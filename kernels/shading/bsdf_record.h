@@ -1,15 +1,32 @@
 // A material at an interaction: `pbr`, generated from clfractal/shading/materials.py, and made ready to scatter.
-#include "shading/bsdf_glass.h"
+#include "shading/albedos.h"
+#include "shading/microfacets.h"
 #include "pbr.h"
+
+// What of it is glass (`elements/materials/transmission.h`).
+typedef struct {
+    real weight;             // part of the surface that is glass
+    real across;             // index of the side beyond over the viewer's ...
+    real mirrors;            // ... and as reflectances have it: the mean of all colours, where they part only now
+    slopes facets;
+    real rough, root;
+    mask inside;             // whether the viewer is
+    color tint;              // of what crosses the boundary
+    real lost, mean_lost;    // between facets: of the viewer's direction; of all on this side
+    real mean_beyond;        // the same on the other side
+    real crosses;
+} glass;
 
 // A material at an interaction, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
     vec out;                // ... and in it the direction to the viewer
     color body, metal, edge, gloss;   // diffuse colour; a metal's reflectance straight on and its tint at the edge; tint of a dielectric's
-    real metalness, rough_body, rough, alpha, ior, root;   // ior and square root of the reflectance of the dielectric's boundary
+    slopes facets;                    // of the boundary
+    real metalness, rough_body, rough, ior, root;   // ior and square root of the reflectance of the dielectric's boundary
     color coat_tint;
-    real coat, coat_rough, coat_alpha, coat_ior, coat_root, coat_albedo;
+    slopes coat_facets;
+    real coat, coat_rough, coat_ior, coat_root, coat_albedo;
     color fuzz;
     real fuzz_rough, fuzz_albedo;
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere

@@ -37,6 +37,7 @@ kernels/*/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/geometry/objects.h: render/objects render/objects_light
 kernels/*/shape*: render/objects render/joined render/emitter_places
 kernels/elements/shapes/*: render/objects render/joined render/emitter_places
+kernels/elements/materials/*: render/materials render/layers render/glass
 kernels/geometry/object_grids.h: render/object_grids render/turned_grids
 kernels/geometry/clouds.h: render/clouds
 kernels/shading/medium_event.h: render/clouds render/volume_paths

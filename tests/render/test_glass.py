@@ -1,4 +1,4 @@
-"""Glass (`bsdf_glass.h`) keeps energy from both sides, is the same both ways and bends light by Snell's law."""
+"""Glass (`transmission.h`) keeps energy from both sides, is the same both ways and bends light by Snell's law."""
 
 from __future__ import annotations
 
