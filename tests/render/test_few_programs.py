@@ -26,6 +26,7 @@ LAMPS = [
     {"type": "spot", "position": [0, 0, 3], "direction": [0, 0, -1]},
     {"type": "point", "position": [2, 2, 2]},
     {"direction": [1, 1, -1], "angular_size": 4},
+    {"type": "ies", "position": [2, -2, 2]},
 ]
 # Of each feature what a scene says, and the programs that it needs beside those of a plain one.
 FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
