@@ -125,10 +125,12 @@ def azimuth(desk: Desk) -> float:
 
 
 def test_orbits(desk: Desk) -> None:
-    """The keys move the camera, not the object: to its right it sees more of the right side."""
-    first = desk.camera
+    """The keys move the camera about what the middle shows: to its right it sees more of the right side."""
+    first, pivot = desk.camera, desk.aim().point
+    assert pivot is not None
     desk.do("orbit_right")
     assert azimuth(desk) > 1
+    assert math.dist(desk.camera.position, pivot) == pytest.approx(math.dist(first.position, pivot))
     desk.do("orbit_left")
     assert desk.camera.position == pytest.approx(first.position, abs=1e-9)
     desk.do("orbit_up")

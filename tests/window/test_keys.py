@@ -1,4 +1,4 @@
-"""Keys: flight by position on any layout, views, turns, undo, help, Escape; what they do to the scene."""
+"""Keys in a real window: flight by position on any layout, help, panels, Escape; all else is asked without a window."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clfractal.scene.parts import OrthographicCamera
 from tests.window.display import Display, needed
 from tests.window.driver import Window, wait_for
 from tests.window.scenes import SPHERE
@@ -92,62 +91,13 @@ def test_signs_of_this_layout(window: Window, french: None) -> None:
     assert window.scene().output.exposure == -0.25
 
 
-@pytest.mark.parametrize(
-    ("key", "axis"),
-    [
-        ("1", (0, -1, 0)),
-        ("shift+1", (0, 1, 0)),
-        ("3", (1, 0, 0)),
-        ("shift+3", (-1, 0, 0)),
-        ("7", (0, 0, 1)),
-        ("shift+7", (0, 0, -1)),
-    ],
-)
-def test_the_six_views(window: Window, key: str, axis: tuple[int, int, int]) -> None:
+@pytest.mark.parametrize(("key", "back"), [("F1", "Escape"), ("F2", "F2")], ids=["help", "panels"])
+def test_help_and_panels_come_and_go(window: Window, key: str, back: str) -> None:
+    plain = window.still(8.0)  # messages have gone
     window.keys(key)
-    found = position(window)
-    assert np.allclose(found / np.linalg.norm(found), axis, atol=1e-6)
-
-
-def test_perspective_and_orthographic(window: Window) -> None:
-    before = window.still(8.0)  # messages have gone
-    window.keys("5")
-    window.still()
-    camera = window.scene().camera
-    assert isinstance(camera, OrthographicCamera)
-    assert camera.height == pytest.approx(2 * 3 * np.tan(np.radians(30)))
-    window.keys("5")
-    wait_for(lambda: np.array_equal(window.pixels(), before), "the picture of before")
-
-
-def test_arrows_turn_and_the_other_way_turns_back(window: Window) -> None:
-    """About what the picture's middle shows: the sphere's nearest point."""
-    before = window.scene().camera
-    window.keys("Left", "Left")
-    window.still()
-    turned = window.scene().camera
-    angle = np.degrees(np.arctan2(*(np.array(turned.position) - (0, -1, 0))[:2]))
-    assert abs(abs(angle) - 180) == pytest.approx(2 * 24 / 360 * 180, abs=0.05)
-    window.keys("Right", "Right")
-    window.still()
-    assert np.allclose(window.scene().camera.position, before.position, atol=2e-3)  # a part of a pixel
-
-
-def test_help_opens_and_escape_closes_it(window: Window) -> None:
-    plain = window.still(8.0)
-    window.keys("F1")
-    helped = window.still()
-    assert (helped != plain).any(axis=2).mean() > 0.2
-    window.keys("Escape")
-    wait_for(lambda: np.array_equal(window.pixels(), plain), "the picture without help")
-
-
-def test_panels_come_and_go(window: Window) -> None:
-    plain = window.still(8.0)
-    window.keys("F2")
     assert (window.still() != plain).any(axis=2).mean() > 0.2
-    window.keys("F2")
-    wait_for(lambda: np.array_equal(window.pixels(), plain), "the picture without panels")
+    window.keys(back)
+    wait_for(lambda: np.array_equal(window.pixels(), plain), "the picture of before")
 
 
 def test_a_held_key_ends_when_the_window_loses_the_keyboard(window: Window) -> None:
@@ -156,37 +106,6 @@ def test_a_held_key_ends_when_the_window_loses_the_keyboard(window: Window) -> N
     window.display.xdotool("keyup", "w", "sleep", 0.3)
     one = position(window)
     assert (position(window) == one).all()
-
-
-def test_stereo_modes_go_round(window: Window) -> None:
-    window.keys("n")
-    window.still()
-    first = window.scene().stereo
-    window.keys("n")
-    window.still()
-    second = window.scene().stereo
-    assert first is not None
-    assert second is not None
-    assert first.mode != second.mode
-    window.keys("x")
-    window.still()
-    assert window.scene().stereo == second.model_copy(update={"swap": True})
-    window.keys("shift+n", "shift+n")
-    window.still()
-    assert window.scene().stereo is None
-
-
-def test_bookmarks_are_kept_in_the_scene(window: Window) -> None:
-    camera = window.scene().camera
-    window.keys("b")
-    window.keys("7")
-    window.still()
-    kept = window.scene()
-    assert list(kept.bookmarks.values()) == [camera]
-    assert kept.camera != camera
-    window.keys("ctrl+1")
-    window.still()
-    assert np.allclose(window.scene().camera.position, camera.position, atol=1e-9)
 
 
 def test_escape_closes_a_menu_and_a_text_alone(display: Display, folder: Path) -> None:

@@ -62,7 +62,7 @@ def banner(window: Window, plain: Pixels) -> int:
 
 
 def test_what_cannot_be_loaded_is_told_at_once(display: Display, folder: Path) -> None:
-    """The pointer does not move: nothing else wakes the window."""
+    """The pointer does not move: nothing else wakes the window. What was changed here is kept, also by undo after F5."""
     scene = folder / "s.yaml"
     scene.write_text(SURFACE)
     (folder / "settings.yaml").write_text("autosave: 0\n")
@@ -73,6 +73,10 @@ def test_what_cannot_be_loaded_is_told_at_once(display: Display, folder: Path) -
         scene.write_text(DARKER)
         wait_for(lambda: banner(window, plain) > 2000, "a message about the file", 10)
         window.shows(plain, 30)  # it goes, and the changes of the window are still there
+        window.keys("F5")
+        window.shows(film(folder, scene, SIZE))
+        window.keys("ctrl+z")
+        window.shows(plain)
 
 
 def test_a_file_that_is_gone_is_told(display: Display, folder: Path) -> None:

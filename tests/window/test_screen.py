@@ -62,16 +62,10 @@ def test_full_screen_and_back(window: Window) -> None:
     assert np.abs(np.subtract(window.place, before)).max() <= 40  # a frame may be put around it
 
 
-def test_it_begins_in_full_screen(desktop: Display, folder: Path) -> None:
+@pytest.mark.parametrize("options", [["--fullscreen"], ["--monitors", "1"]])
+def test_it_begins_in_full_screen(desktop: Display, folder: Path, options: list[str]) -> None:
     (folder / "s.yaml").write_text(SURFACE)
-    with Window(desktop, folder, "s.yaml", "--fullscreen") as found:
-        wait_for(lambda: found.place == (0, 0, *SCREEN), "the full screen")
-        shows_its_film(found)
-
-
-def test_over_all_chosen_monitors(desktop: Display, folder: Path) -> None:
-    (folder / "s.yaml").write_text(SURFACE)
-    with Window(desktop, folder, "s.yaml", "--monitors", "1") as found:
+    with Window(desktop, folder, "s.yaml", *options) as found:
         wait_for(lambda: found.place == (0, 0, *SCREEN), "the full screen")
         shows_its_film(found)
 
