@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from clfractal.errors import STATUS_BAD_INPUT
+from tests.scene.errors import cases
 from tests.shell import SCENE, InProcess
 
 
@@ -30,83 +31,54 @@ def added(here: Path) -> set[str]:
 @pytest.mark.parametrize(
     ("lines", "message"),
     [
-        (
-            "stereo:\n  screen_width: 0",
-            "6:17: stereo.screen_width: must be above 0, got 0",
-        ),
-        ("stereo:\n  screen_distance: -0.6", "6:20: stereo.screen_distance: must be above 0, got -0.6"),
-        (
-            "stereo:\n  interpupillary_distance: 0.0",
-            "6:28: stereo.interpupillary_distance: must be above 0, got 0",
-        ),
-        ("stereo: {screen_width: .nan}", "5:24: stereo.screen_width: must be a finite number, got .nan"),
-        ("stereo: {screen_width: wide}", "5:24: stereo.screen_width: must be a number, got 'wide'"),
-        (
-            "stereo: {screen_width: 1.0e-9}",
-            "5:9: stereo.screen_distance: must be within a factor of 10,000 of screen_width (1e-09), in the same unit,"
-            " got 0.6",
-        ),
-        (
-            "stereo: {interpupillary_distance: 6300}",
-            "5:35: stereo.interpupillary_distance: must be within a factor of 10,000 of screen_width (0.52), in the"
-            " same unit, got 6300",
+        *cases(
+            """
+stereo:
+  screen_width: 0 => 6:17: stereo.screen_width: must be above 0, got 0
+stereo:
+  screen_distance: -0.6 => 6:20: stereo.screen_distance: must be above 0, got -0.6
+stereo:
+  interpupillary_distance: 0.0 => 6:28: stereo.interpupillary_distance: must be above 0, got 0
+stereo: {screen_width: .nan} => 5:24: stereo.screen_width: must be a finite number, got .nan
+stereo: {screen_width: wide} => 5:24: stereo.screen_width: must be a number, got 'wide'
+stereo: {screen_width: 1.0e-9}
+=> 5:9: stereo.screen_distance: must be within a factor of 10,000 of screen_width (1e-09), in the same unit, got 0.6
+stereo: {interpupillary_distance: 6300}
+=> 5:35: stereo.interpupillary_distance: must be within a factor of 10,000 of screen_width (0.52), in the same unit, got
+    6300
+stereo: {mod: split} => 5:10: stereo: unknown key 'mod'; did you mean 'mode'?
+stereo: {separation: -1} => 5:22: stereo.separation: must be at least 0, got -1
+stereo: {budget: 0} => 5:18: stereo.budget: must be above 0, got 0
+stereo: {fit: yes} => 5:15: stereo.fit: must be auto, got 'yes'
+stereo: {mode: split_half}
+image: {width: 41, height: 36}
+=> 6:16: image.width: must be even for stereo.mode split_half, where each eye gets half of it, got 41
+stereo: {mode: over_under_half}
+image: {width: 40, height: 35}
+=> 6:28: image.height: must be even for stereo.mode over_under_half, where each eye gets half of it, got 35
+stereo: {colors: [[1, 0, 1.5], [0, 1, 0]]} => 5:26: stereo.colors.0.2: must be at most 1, got 1.5
+stereo: {colors: [[1, 0, 0], [0, -1, 0]]} => 5:34: stereo.colors.1.1: must be at least 0, got -1
+stereo: {colors: [[1, 0, 0]]} => 5:18: stereo.colors: must be a list of 2 lists, got a list of 1
+stereo: {mode: anaglyph}
+output: {channels: [R, Z]} => 6:20: output.channels: anaglyph needs the channels R, G, B; G, B not among them
+stereo: {plane: {normal: [0, 0, 0]}} => 5:26: stereo.plane.normal: must not be zero
+stereo: {plane: {up: [0, 0, 0]}} => 5:22: stereo.plane.up: must not be zero
+stereo: {plane: {normal: [0, -1, 1], up: [0, 2, -2]}} => 5:42: stereo.plane.up: must not be parallel to the normal
+stereo: {plane: {width: 0}} => 5:25: stereo.plane.width: must be at least 1e-18, got 0
+stereo: {fit: auto}
+layout: {views: [{}, {}]} => 5:15: stereo.fit: auto cannot fit several views at once; give plane and separation instead
+stereo: {fit: auto}
+renderer: {type: cut_plane} => 5:15: stereo.fit: auto needs depth, but the picture of a cut_plane renderer is flat
+stereo: {fit: auto, convergence: toe_in}
+=> 5:15: stereo.fit: auto needs convergence off_axis, where parallax follows from depth alone, got toe_in
+stereo: 3 => 5:9: stereo: must be a mapping, got 3
+"""
         ),
         ("stereo: {mode: anaglif}", "5:16: stereo.mode: must be left, right, "),
-        ("stereo: {mod: split}", "5:10: stereo: unknown key 'mod'; did you mean 'mode'?"),
-        ("stereo: {separation: -1}", "5:22: stereo.separation: must be at least 0, got -1"),
-        ("stereo: {budget: 0}", "5:18: stereo.budget: must be above 0, got 0"),
-        ("stereo: {fit: yes}", "5:15: stereo.fit: must be auto, got 'yes'"),
-        (
-            "stereo: {mode: split_half}\nimage: {width: 41, height: 36}",
-            "6:16: image.width: must be even for stereo.mode split_half, where each eye gets half of it, got 41",
-        ),
-        (
-            "stereo: {mode: over_under_half}\nimage: {width: 40, height: 35}",
-            "6:28: image.height: must be even for stereo.mode over_under_half, where each eye gets half of it, got 35",
-        ),
-        (
-            "stereo: {colors: [[1, 0, 1.5], [0, 1, 0]]}",
-            "5:26: stereo.colors.0.2: must be at most 1, got 1.5",
-        ),
-        (
-            "stereo: {colors: [[1, 0, 0], [0, -1, 0]]}",
-            "5:34: stereo.colors.1.1: must be at least 0, got -1",
-        ),
-        (
-            "stereo: {colors: [[1, 0, 0]]}",
-            "5:18: stereo.colors: must be a list of 2 lists, got a list of 1",
-        ),
-        (
-            "stereo: {mode: anaglyph}\noutput: {channels: [R, Z]}",
-            "6:20: output.channels: anaglyph needs the channels R, G, B; G, B not among them",
-        ),
-        (
-            "stereo: {plane: {normal: [0, 0, 0]}}",
-            "5:26: stereo.plane.normal: must not be zero",
-        ),
-        ("stereo: {plane: {up: [0, 0, 0]}}", "5:22: stereo.plane.up: must not be zero"),
-        (
-            "stereo: {plane: {normal: [0, -1, 1], up: [0, 2, -2]}}",
-            "5:42: stereo.plane.up: must not be parallel to the normal",
-        ),
-        ("stereo: {plane: {width: 0}}", "5:25: stereo.plane.width: must be at least 1e-18, got 0"),
-        (
-            "stereo: {fit: auto}\nlayout: {views: [{}, {}]}",
-            "5:15: stereo.fit: auto cannot fit several views at once; give plane and separation instead",
-        ),
-        (
-            "stereo: {fit: auto}\nrenderer: {type: cut_plane}",
-            "5:15: stereo.fit: auto needs depth, but the picture of a cut_plane renderer is flat",
-        ),
-        (
-            "stereo: {fit: auto, convergence: toe_in}",
-            "5:15: stereo.fit: auto needs convergence off_axis, where parallax follows from depth alone, got toe_in",
-        ),
         (
             "stereo: {}\nlayout: {views: [{}, {camera: {projection: orthographic}}]}",
             "6:44: layout.views.1.camera.projection: must be perspective with stereo: ",
         ),
-        ("stereo: 3", "5:9: stereo: must be a mapping, got 3"),
     ],
 )
 def test_bad_input(here: Path, shell: InProcess, lines: str, message: str) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -22,3 +23,11 @@ def marked(text: str) -> tuple[str, str]:
     """The text without its mark, and the mark's place as messages show it."""
     before, _, after = text.partition("§")
     return before + after, f"scene:{before.count(chr(10)) + 1}:{len(before) - before.rfind(chr(10))}"
+
+
+def cases(table: str, **names: object) -> list[tuple[str, str]]:
+    """Wrong texts, and after `=>`, there or below, what is told; indented lines go on. «NAME» is a name's text."""
+    for name, text in names.items():
+        table = table.replace(f"«{name}»", str(text))
+    found = re.findall(r"^(?!# )(\S.*?(?:\n.+?)*?)\s*=> (.*(?:\n +.*)*)$", table, re.MULTILINE)
+    return [(text, re.sub(r"\n +", " ", message)) for text, message in found]

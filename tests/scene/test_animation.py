@@ -186,12 +186,6 @@ def test_a_camera_follows_a_target_with_a_clock_of_its_own() -> None:
     assert clfractal.at_frame(moving({"camera.target": target, **moved}), 10).camera.target == (1, 0, 1)
 
 
-def test_before_its_first_key_a_repeating_track_rests() -> None:
-    for repeat in ("loop", "ping_pong"):
-        track = keys((5, 0.0), (10, 1.0), interpolation="linear", repeat=repeat)
-        assert values(moving({"coloring.offset": track}), "coloring.offset")[:6] == [0.0] * 6
-
-
 @pytest.mark.parametrize("seconds", [8.3, 4.1, 0.7])
 def test_a_loop_may_end_with_its_first_key_in_seconds(seconds: float) -> None:
     wave = ((0, 0), (seconds / 3, 1), (2 * seconds / 3, -1), (seconds, 0))
@@ -257,16 +251,6 @@ def test_noise_is_new_in_each_frame_or_fixed() -> None:
         assert scene.layout.views[1].renderer.seed == 5 + number
     fixed = clfractal.at_frame(moving({}, base=base, noise="fixed"), 2)
     assert fixed.renderer.seed == 2**32 - 2
-
-
-def test_it_loads_back_to_an_equal_scene() -> None:
-    scene = moving(
-        {
-            "camera.fov": keys((0, 40), (20, 20), repeat="loop"),
-            "formula.parameters.power": {"expression": "8"},
-        }
-    )
-    assert load_scene(dump_scene(scene)) == scene
 
 
 # --- what is refused ---

@@ -22,6 +22,7 @@ from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import angles, orbited
 from clfractal.viewer.saving import open_source, scene_text
+from tests.scene.errors import cases
 
 HEAD = "version: 1\nformula: {name: mandelbulb}\nimage: {width: 96, height: 54}\n"
 numbers = st.floats(-5, 5, allow_nan=False)
@@ -224,25 +225,19 @@ def test_views_and_bookmarks_have_their_own_frames() -> None:
 
 @pytest.mark.parametrize(
     ("keys", "message"),
-    [
-        (
-            "frame: all, orbit: {distance: 3}",
-            "camera.orbit.distance: is chosen by camera.frame; remove one of them",
-        ),
-        ("orbit: {elevation: 91}", "camera.orbit.elevation: must be at most 90, got 91"),
-        ("orbit: {azimut: 9}", "camera.orbit: unknown key 'azimut'; did you mean 'azimuth'?"),
-        ("frame: some", "camera.frame: must be all, got 'some'"),
-        ("roll: x", "camera.roll: must be a number, got 'x'"),
-        (
-            "position: [0, 1000000, 0], shift: {forward: -9}",
-            "camera.shift: must leave the camera's coordinates below 1,000,000",
-        ),
-        (
-            "target: [1000000, 0, 0], orbit: {azimuth: 90, elevation: 0, distance: 1}",
-            "camera.orbit.distance: must leave the camera's coordinates below 1,000,000",
-        ),
-        ("position: [0, 0, 0], orbit: {distance: 3}", "camera.target: must differ from camera.position"),
-    ],
+    cases(
+        """
+frame: all, orbit: {distance: 3} => camera.orbit.distance: is chosen by camera.frame; remove one of them
+orbit: {elevation: 91} => camera.orbit.elevation: must be at most 90, got 91
+orbit: {azimut: 9} => camera.orbit: unknown key 'azimut'; did you mean 'azimuth'?
+frame: some => camera.frame: must be all, got 'some'
+roll: x => camera.roll: must be a number, got 'x'
+position: [0, 1000000, 0], shift: {forward: -9} => camera.shift: must leave the camera's coordinates below 1,000,000
+target: [1000000, 0, 0], orbit: {azimuth: 90, elevation: 0, distance: 1}
+=> camera.orbit.distance: must leave the camera's coordinates below 1,000,000
+position: [0, 0, 0], orbit: {distance: 3} => camera.target: must differ from camera.position
+"""
+    ),
 )
 def test_mistakes(keys: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:

@@ -71,12 +71,6 @@ def test_a_number_is_the_parabola_where_that_is_monotone() -> None:
     assert curve.number(1.7) == pytest.approx(2.7**2)
 
 
-def test_a_number_rests_beside_a_flat_stretch() -> None:
-    curve = Monotone([0, 10, 20, 30], [0.0, 5.0, 5.0, 9.0])
-    assert curve.slopes[1] == 0 == curve.slopes[2]
-    assert {curve.number(time) for time in np.linspace(10, 20, 7)} == {5.0}
-
-
 def test_a_ring_of_numbers_has_no_seam() -> None:
     curve = Monotone([0, 3, 5, 8], [1.0, 4.0, 2.0, 1.0], closed=True)
     assert curve.slopes[0] == curve.slopes[-1]

@@ -20,6 +20,7 @@ from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from tests.environment_maps import write_map
 from tests.makers import maker
+from tests.scene.errors import cases
 from tests.shell import SCENE, InProcess, process
 
 OUR_OWN = ("dusk", "overcast", "studio")
@@ -66,16 +67,18 @@ def test_a_map_beside_the_scene(folder: Path, file: str, value: float) -> None:
 
 @pytest.mark.parametrize(
     ("environment", "message"),
-    [
-        ("file: none.exr", "file: {0}/none.exr cannot be read: No such file or directory"),
-        ("file: scene.yaml", "file: {0}/scene.yaml is not an OpenEXR file"),
-        ("file: maps", "file: {0}/maps is a folder, not a file"),
-        ("file: ../secret.exr", "file: must be a path inside the scene's folder, got '../secret.exr'"),
-        ("file: /etc/passwd", "file: must be a path inside the scene's folder, got '/etc/passwd'"),
-        ("file: link.exr", "file: leads out of the scene's folder: 'link.exr'"),
-        ("name: studoi", "name: unknown environment 'studoi'; did you mean 'studio'?"),
-        ("name: xyz", "name: unknown environment 'xyz'; known: dusk, overcast, studio"),
-    ],
+    cases(
+        """
+file: none.exr => file: {0}/none.exr cannot be read: No such file or directory
+file: scene.yaml => file: {0}/scene.yaml is not an OpenEXR file
+file: maps => file: {0}/maps is a folder, not a file
+file: ../secret.exr => file: must be a path inside the scene's folder, got '../secret.exr'
+file: /etc/passwd => file: must be a path inside the scene's folder, got '/etc/passwd'
+file: link.exr => file: leads out of the scene's folder: 'link.exr'
+name: studoi => name: unknown environment 'studoi'; did you mean 'studio'?
+name: xyz => name: unknown environment 'xyz'; known: dusk, overcast, studio
+"""
+    ),
 )
 def test_what_is_wrong_stands_at_its_line_and_column(folder: Path, environment: str, message: str) -> None:
     (folder / "link.exr").symlink_to("../secret.exr")

@@ -16,6 +16,7 @@ from clfractal.scene.object_grids import placed, volumes_of
 from clfractal.scene.objects import MAX_VOLUMES
 from tests.render.objects_oracle import rotation_of
 from tests.render.volumes import keep, value_at
+from tests.scene.errors import cases, error_of, marked
 from tests.scenes import HEAD
 
 VALUES = np.random.default_rng(1).uniform(2, 7, (4, 5, 6)).astype(np.float32)
@@ -36,85 +37,61 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 # In the texts below the sign § stands where the message must point to.
 CASES = [
-    ("objects: {v: §{type: volume}}", "objects.v.file: is missing"),
-    (
-        "objects: {v: {type: volume, file: §none.nrrd}}",
-        "objects.v.file: {folder}/none.nrrd cannot be read: No such file or directory",
-    ),
-    (
-        "objects: {v: {type: volume, file: §text.nrrd}}",
-        "objects.v.file: {folder}/text.nrrd is neither a NRRD nor a NPY file",
-    ),
-    (
-        "objects: {v: {type: volume, file: §../v.nrrd}}",
-        "objects.v.file: must be a path inside the scene's folder, got '../v.nrrd'",
-    ),
-    (
-        "objects: {v: {type: volume, file: §nan.nrrd}}",
-        "objects.v.file: nan.nrrd holds nothing but NaN, so there is no value to show",
-    ),
-    (
-        "objects: {v: {type: volume, file: v.nrrd, level: §7.5}}",
-        "objects.v.level: must be above 2 and at most 7, the ends of the grid's values, got 7.5",
-    ),
-    (
-        "objects: {v: {type: volume, file: v.nrrd, join: §cut}}",
-        "objects.v.join: is not for volumes, which stand beside the set; remove it",
-    ),
-    (
-        f"objects: {{{FULL}, last: {{type: §volume, file: v.nrrd}}}}",
-        f"objects.last.type: at most {MAX_VOLUMES} objects can be volumes, and this is one more",
+    *cases(
+        """
+objects: {v: §{type: volume}} => objects.v.file: is missing
+objects: {v: {type: volume, file: §none.nrrd}}
+=> objects.v.file: {folder}/none.nrrd cannot be read: No such file or directory
+objects: {v: {type: volume, file: §text.nrrd}} => objects.v.file: {folder}/text.nrrd is neither a NRRD nor a NPY file
+objects: {v: {type: volume, file: §../v.nrrd}}
+=> objects.v.file: must be a path inside the scene's folder, got '../v.nrrd'
+objects: {v: {type: volume, file: §nan.nrrd}}
+=> objects.v.file: nan.nrrd holds nothing but NaN, so there is no value to show
+objects: {v: {type: volume, file: v.nrrd, level: §7.5}}
+=> objects.v.level: must be above 2 and at most 7, the ends of the grid's values, got 7.5
+objects: {v: {type: volume, file: v.nrrd, join: §cut}}
+=> objects.v.join: is not for volumes, which stand beside the set; remove it
+objects: {«FULL», last: {type: §volume, file: v.nrrd}}
+=> objects.last.type: at most «MAX_VOLUMES» objects can be volumes, and this is one more
+objects: {v: {type: volume, file: v.nrrd, transfer: {color: §[{at: 0, color: [1, 1, 1]}]}}}
+=> objects.v.transfer.color: needs opacity, since a surface has its material's color
+«PATHS»materials: {a: {}}
+objects: {v: {type: volume, file: v.nrrd, «STOPS», material: §a}}
+=> objects.v.material: is for surfaces; a cloud, which transfer.opacity makes, has none
+«PATHS»fog: {density: 0.1, scattering: §{}}
+objects: {v: {type: volume, file: v.nrrd, «STOPS»}}
+=> fog.scattering: cannot be combined with a cloud, objects.v; remove it, and the fog has its colour alone
+«PATHS»materials: {ice: {transmission: {weight: 1}}}
+objects: {v: {type: volume, file: v.nrrd, material: §ice}}
+=> objects.v.material: 'ice' is glass, which volumes cannot be; name another material
+renderer: {type: volume}
+objects: {v: {type: §volume, file: v.nrrd}}
+=> objects.v.type: cannot be volume with renderer volume: its values are in a file, not in a formula; use the surface
+    renderer
+objects: {v: {type: volume, file: v.nrrd}}
+cut_planes: [{cut: true, objects: [§v]}]
+=> cut_planes.0.objects.0: 'v' cannot be cut: it is a volume, which no plane opens
+lights: [{type: point, position: §[3, 0, 0]}]
+objects: {v: {type: volume, file: v.nrrd, position: [3, 0, 0], level: 2.5}}
+=> lights.0.position: must be outside the object 'v', where its light reaches something, got [3, 0, 0]
+""",
+        FULL=FULL,
+        MAX_VOLUMES=MAX_VOLUMES,
+        PATHS=PATHS,
+        STOPS=STOPS,
     ),
     (
         f"objects: {{v: {{type: volume, file: v.nrrd, {STOPS.replace('[{', '§[{')}}}}}",
         "objects.v.transfer.opacity: makes a cloud, which needs lighting.mode: path; without it a surface at `level` is"
         " shown",
     ),
-    (
-        "objects: {v: {type: volume, file: v.nrrd, transfer: {color: §[{at: 0, color: [1, 1, 1]}]}}}",
-        "objects.v.transfer.color: needs opacity, since a surface has its material's color",
-    ),
-    (
-        PATHS
-        + f"materials: {{a: {{}}}}\nobjects: {{v: {{type: volume, file: v.nrrd, {STOPS}, material: §a}}}}",
-        "objects.v.material: is for surfaces; a cloud, which transfer.opacity makes, has none",
-    ),
-    (
-        PATHS
-        + f"fog: {{density: 0.1, scattering: §{{}}}}\nobjects: {{v: {{type: volume, file: v.nrrd, {STOPS}}}}}",
-        "fog.scattering: cannot be combined with a cloud, objects.v; remove it, and the fog has its colour alone",
-    ),
-    (
-        PATHS
-        + "materials: {ice: {transmission: {weight: 1}}}\nobjects: {v: {type: volume, file: v.nrrd, material: §ice}}",
-        "objects.v.material: 'ice' is glass, which volumes cannot be; name another material",
-    ),
-    (
-        "renderer: {type: volume}\nobjects: {v: {type: §volume, file: v.nrrd}}",
-        "objects.v.type: cannot be volume with renderer volume: its values are in a file, not in a formula; use the"
-        " surface renderer",
-    ),
-    (
-        "objects: {v: {type: volume, file: v.nrrd}}\ncut_planes: [{cut: true, objects: [§v]}]",
-        "cut_planes.0.objects.0: 'v' cannot be cut: it is a volume, which no plane opens",
-    ),
-    (
-        "lights: [{type: point, position: §[3, 0, 0]}]\n"
-        "objects: {v: {type: volume, file: v.nrrd, position: [3, 0, 0], level: 2.5}}",
-        "lights.0.position: must be outside the object 'v', where its light reaches something, got [3, 0, 0]",
-    ),
 ]
 
 
 @pytest.mark.parametrize(("text", "expected"), CASES, ids=[expected[:60] for _, expected in CASES])
 def test_messages(folder: Path, text: str, expected: str) -> None:
-    whole = HEAD + text
-    before, _, after = whole.partition("§")
-    with pytest.raises(ClfractalError) as caught:
-        load_scene(before + after, folder=folder)
-    line, column = before.count("\n") + 1, len(before.rsplit("\n", 1)[-1]) + 1
-    assert str(caught.value) == f"scene:{line}:{column}: {expected.format(folder=folder)}"
-    assert caught.value.status == 2
+    plain, place = marked(HEAD + text)
+    assert error_of(plain, folder=folder) == f"{place}: {expected.format(folder=folder)}"
 
 
 def test_grids_together_may_not_be_too_large(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,6 +16,7 @@ from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.movement import movement_of
 from clfractal.scene.objects import KINDS, MAX_FORMULAS, MAX_OBJECTS, FormulaObject
 from tests.render.objects_oracle import rotation_of
+from tests.scene.errors import cases, error_of, marked
 from tests.scenes import HEAD
 
 STEEL = "materials: {steel: {}, clay: {}}\n"
@@ -26,150 +27,95 @@ FULL = ", ".join(f"f{n}: {{{OTHER}}}" for n in range(MAX_FORMULAS))
 
 # In the texts below the sign § stands where the message must point to.
 CASES = [
-    ("objects: {ball: {radius: §0}}", "objects.ball.radius: must be above 0, got 0"),
+    *cases(
+        """
+objects: {ball: {radius: §0}} => objects.ball.radius: must be above 0, got 0
+objects: {ball: {§size: 3}}
+=> objects.ball: unknown key 'size'; known: join, material, position, radius, rotation, scale, smoothness, type
+objects: {b: {type: box, size: §3}} => objects.b.size: must be a list of 3 numbers, got 3
+objects: {b: {type: box, size: [1, §0, 1]}} => objects.b.size.1: must be above 0, got 0
+objects: {p: {type: plane, normal: §[0, 0, 0]}} => objects.p.normal: must not be zero
+objects: {p: {type: plane, §radius: 1}}
+=> objects.p: unknown key 'radius'; known: join, material, normal, position, smoothness, type
+objects: {sea: {type: water, waves: {direction: §[0, 0, 2]}}} => objects.sea.waves.direction: must not be along the normal
+objects: {sea: {type: water, waves: {direction: §[0, 0, 0]}}} => objects.sea.waves.direction: must not be zero
+objects: {sea: {type: water, waves: {choppiness: §2}}} => objects.sea.waves.choppiness: must be at most 1, got 2
+objects: {ball: {material: §steel}} => objects.ball.material: names 'steel', but the scene has no materials
+«STEEL»objects: {ball: {material: §stel}} => objects.ball.material: unknown material 'stel'; did you mean 'steel'?
+objects: §[1] => objects: must be a mapping, got a list of 1
+renderer: {type: cut_plane}
+objects: {sea: {type: §water}}
+=> objects.sea.type: cannot be water with renderer cut_plane: its waves have no end; {type: plane} can
+lights: [{}, {type: point, position: §[0, 0, -2.1]}]
+objects: {ball: {position: [0, 0, -2]}}
+=> lights.1.position: must be outside the object 'ball', where its light reaches something, got [0, 0, -2.1]
+objects: {ball: {}}
+animation: {frames: 9, tracks: {objects.bal.radius: §{expression: 1 + t}}}
+=> animation.tracks.objects.bal.radius: unknown object 'bal'; did you mean 'ball'?
+objects: {b: §{type: formula}} => objects.b.formula: is missing
+objects: {b: {type: formula, formula: {name: §mandelbul}}}
+=> objects.b.formula.name: unknown formula 'mandelbul'; did you mean 'mandelbulb'?
+objects: {b: {type: formula, formula: {name: mandelbulb, parameters: {§powr: 3}}}}
+=> objects.b.formula.parameters.powr: unknown parameter 'powr'; did you mean 'power'?
+objects: {b: {type: formula, formula: {file: §none.yaml}}}
+=> objects.b.formula.file: none.yaml cannot be read: No such file or directory
+objects: {b: {type: plane, join: §smooth_union}}
+=> objects.b.join: cannot be smooth_union for a plane, which has no end; a flat box can
+objects: {ball: {}}
+cut_planes: [{cut: true, objects: [§bal]}] => cut_planes.0.objects.0: unknown object 'bal'; did you mean 'ball'?
+cut_planes: [{cut: true, objects: [§ball]}] => cut_planes.0.objects.0: unknown object 'ball'; known: none
+objects: {sea: {type: water}}
+cut_planes: [{cut: true, objects: [§sea]}]
+=> cut_planes.0.objects.0: 'sea' cannot be cut: a water surface has no end; a flat box can
+objects: {b: {«OTHER»}}
+cut_planes: [{cut: true, set: false, objects: [§b]}]
+=> cut_planes.0.objects.0: 'b' is a part of the set, which is cut as a whole; set: true cuts it
+renderer: {type: volume}
+cut_planes: [{}, {cut: true, set: §false}]
+=> cut_planes.1.set: is for surface renderers: in a volume all that there is belongs to the set; remove it
+materials: {ice: {transmission: {weight: 1}}}
+lighting: {mode: path}
+material: {name: ice}
+cut_planes: [{cut: true, set: false}, {cut: §true}] => cut_planes.1.cut: cannot open a set of glass, 'ice', along paths
+materials: {ice: {transmission: {weight: 1}}}
+lighting: {mode: path}
+objects: {a: {}, b: {material: ice}}
+cut_planes: [{cut: true, objects: [a, §b]}] => cut_planes.0.objects.1: 'b' is of glass, which cannot be cut along paths
+cut_planes: [{set: §1}] => cut_planes.0.set: must be true or false, got 1
+renderer: {type: volume}
+objects: {sea: {type: §water}}
+=> objects.sea.type: cannot be water with renderer volume: its waves have no end; {type: plane} can
+objects: {b: {join: §cutt}}
+=> objects.b.join: must be union, smooth_union, cut or intersection, got 'cutt'; did you mean 'cut'?
+objects: {b: {join: smooth_union, smoothness: §0}} => objects.b.smoothness: must be above 0, got 0
+objects: {«FULL», last: {type: §formula, formula: {name: mandelbulb}}}
+=> objects.last.type: at most «MAX_FORMULAS» objects can be formulas, and this is one more
+materials: {ice: {transmission: {weight: 1}}, clay: {}}
+lighting: {mode: path}
+material: {name: ice}
+objects: {b: {join: cut, material: §clay}}
+=> objects.b.material: 'clay' is not the glass of the set, 'ice', to which it is joined
+objects: {b: {«OTHER»}}
+animation: {frames: 9, tracks: {objects.b.formula.parameters.powr: §{expression: 1 + t}}}
+=> animation.tracks.objects.b.formula.parameters.powr: unknown parameter 'powr'; known: scale
+""",
+        FULL=FULL,
+        MAX_FORMULAS=MAX_FORMULAS,
+        OTHER=OTHER,
+        STEEL=STEEL,
+    ),
     (
         "objects: {ball: {type: §bal}}",
         "objects.ball.type: unknown type 'bal'; known: " + ", ".join(sorted(kind.tag for kind in KINDS)),
     ),
-    (
-        "objects: {ball: {§size: 3}}",
-        "objects.ball: unknown key 'size'; known: join, material, position, radius, rotation, scale, smoothness, type",
-    ),
-    ("objects: {b: {type: box, size: §3}}", "objects.b.size: must be a list of 3 numbers, got 3"),
-    ("objects: {b: {type: box, size: [1, §0, 1]}}", "objects.b.size.1: must be above 0, got 0"),
-    ("objects: {p: {type: plane, normal: §[0, 0, 0]}}", "objects.p.normal: must not be zero"),
-    (
-        "objects: {p: {type: plane, §radius: 1}}",
-        "objects.p: unknown key 'radius'; known: join, material, normal, position, smoothness, type",
-    ),
-    (
-        "objects: {sea: {type: water, waves: {direction: §[0, 0, 2]}}}",
-        "objects.sea.waves.direction: must not be along the normal",
-    ),
-    (
-        "objects: {sea: {type: water, waves: {direction: §[0, 0, 0]}}}",
-        "objects.sea.waves.direction: must not be zero",
-    ),
-    (
-        "objects: {sea: {type: water, waves: {choppiness: §2}}}",
-        "objects.sea.waves.choppiness: must be at most 1, got 2",
-    ),
-    (
-        "objects: {ball: {material: §steel}}",
-        "objects.ball.material: names 'steel', but the scene has no materials",
-    ),
-    (
-        STEEL + "objects: {ball: {material: §stel}}",
-        "objects.ball.material: unknown material 'stel'; did you mean 'steel'?",
-    ),
     (f"objects: §{{{MANY}}}", f"objects: must have at most {MAX_OBJECTS} entries, got {MAX_OBJECTS + 1}"),
-    ("objects: §[1]", "objects: must be a mapping, got a list of 1"),
-    (
-        "renderer: {type: cut_plane}\nobjects: {sea: {type: §water}}",
-        "objects.sea.type: cannot be water with renderer cut_plane: its waves have no end; {type: plane} can",
-    ),
-    (
-        "lights: [{}, {type: point, position: §[0, 0, -2.1]}]\nobjects: {ball: {position: [0, 0, -2]}}",
-        "lights.1.position: must be outside the object 'ball', where its light reaches something, got [0, 0, -2.1]",
-    ),
-    (
-        "objects: {ball: {}}\nanimation: {frames: 9, tracks: {objects.bal.radius: §{expression: 1 + t}}}",
-        "animation.tracks.objects.bal.radius: unknown object 'bal'; did you mean 'ball'?",
-    ),
-    ("objects: {b: §{type: formula}}", "objects.b.formula: is missing"),
-    (
-        "objects: {b: {type: formula, formula: {name: §mandelbul}}}",
-        "objects.b.formula.name: unknown formula 'mandelbul'; did you mean 'mandelbulb'?",
-    ),
-    (
-        "objects: {b: {type: formula, formula: {name: mandelbulb, parameters: {§powr: 3}}}}",
-        "objects.b.formula.parameters.powr: unknown parameter 'powr'; did you mean 'power'?",
-    ),
-    (
-        "objects: {b: {type: formula, formula: {file: §none.yaml}}}",
-        "objects.b.formula.file: none.yaml cannot be read: No such file or directory",
-    ),
-    (
-        "objects: {b: {type: plane, join: §smooth_union}}",
-        "objects.b.join: cannot be smooth_union for a plane, which has no end; a flat box can",
-    ),
-    (
-        "objects: {ball: {}}\ncut_planes: [{cut: true, objects: [§bal]}]",
-        "cut_planes.0.objects.0: unknown object 'bal'; did you mean 'ball'?",
-    ),
-    (
-        "cut_planes: [{cut: true, objects: [§ball]}]",
-        "cut_planes.0.objects.0: unknown object 'ball'; known: none",
-    ),
-    (
-        "objects: {sea: {type: water}}\ncut_planes: [{cut: true, objects: [§sea]}]",
-        "cut_planes.0.objects.0: 'sea' cannot be cut: a water surface has no end; a flat box can",
-    ),
-    (
-        f"objects: {{b: {{{OTHER}}}}}\ncut_planes: [{{cut: true, set: false, objects: [§b]}}]",
-        "cut_planes.0.objects.0: 'b' is a part of the set, which is cut as a whole; set: true cuts it",
-    ),
-    (
-        "renderer: {type: volume}\ncut_planes: [{}, {cut: true, set: §false}]",
-        "cut_planes.1.set: is for surface renderers: in a volume all that there is belongs to the set; remove it",
-    ),
-    (
-        "materials: {ice: {transmission: {weight: 1}}}\nlighting: {mode: path}\nmaterial: {name: ice}\n"
-        "cut_planes: [{cut: true, set: false}, {cut: §true}]",
-        "cut_planes.1.cut: cannot open a set of glass, 'ice', along paths",
-    ),
-    (
-        "materials: {ice: {transmission: {weight: 1}}}\nlighting: {mode: path}\n"
-        "objects: {a: {}, b: {material: ice}}\ncut_planes: [{cut: true, objects: [a, §b]}]",
-        "cut_planes.0.objects.1: 'b' is of glass, which cannot be cut along paths",
-    ),
-    ("cut_planes: [{set: §1}]", "cut_planes.0.set: must be true or false, got 1"),
-    (
-        "renderer: {type: volume}\nobjects: {sea: {type: §water}}",
-        "objects.sea.type: cannot be water with renderer volume: its waves have no end; {type: plane} can",
-    ),
-    (
-        "objects: {b: {join: §cutt}}",
-        "objects.b.join: must be union, smooth_union, cut or intersection, got 'cutt'; did you mean 'cut'?",
-    ),
-    ("objects: {b: {join: smooth_union, smoothness: §0}}", "objects.b.smoothness: must be above 0, got 0"),
-    (
-        f"objects: {{{FULL}, last: {{type: §formula, formula: {{name: mandelbulb}}}}}}",
-        f"objects.last.type: at most {MAX_FORMULAS} objects can be formulas, and this is one more",
-    ),
-    (
-        "materials: {ice: {transmission: {weight: 1}}, clay: {}}\nlighting: {mode: path}\n"
-        "material: {name: ice}\nobjects: {b: {join: cut, material: §clay}}",
-        "objects.b.material: 'clay' is not the glass of the set, 'ice', to which it is joined",
-    ),
-    (
-        f"objects: {{b: {{{OTHER}}}}}\nanimation: {{frames: 9, tracks: {{"
-        "objects.b.formula.parameters.powr: §{expression: 1 + t}}}",
-        "animation.tracks.objects.b.formula.parameters.powr: unknown parameter 'powr'; known: scale",
-    ),
 ]
 
 
 @pytest.mark.parametrize(("text", "expected"), CASES, ids=[expected[:60] for _, expected in CASES])
 def test_messages(text: str, expected: str) -> None:
-    whole = HEAD + text
-    before, _, after = whole.partition("§")
-    with pytest.raises(ClfractalError) as caught:
-        load_scene(before + after)
-    line, column = before.count("\n") + 1, len(before.rsplit("\n", 1)[-1]) + 1
-    assert str(caught.value) == f"scene:{line}:{column}: {expected}"
-    assert caught.value.status == 2
-
-
-def test_a_scene_with_objects_is_written_and_read_again() -> None:
-    text = (
-        STEEL
-        + "objects: {b: {type: box, material: clay}, sea: {type: water, position: [0, 0, -2]}, ball: {}}"
-    )
-    scene = load_scene(HEAD + text)
-    again = load_scene(dump_scene(scene))
-    assert again == scene
-    assert list(again.objects) == ["b", "sea", "ball"]
+    plain, place = marked(HEAD + text)
+    assert error_of(plain) == f"{place}: {expected}"
 
 
 def test_a_lamp_in_a_room_with_the_eye_is_allowed() -> None:

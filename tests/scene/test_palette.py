@@ -40,11 +40,6 @@ def test_stops_are_mixed_in_linear_light() -> None:
     assert not table[place > 0.6].any()
 
 
-def test_two_equal_stops_are_one_colour() -> None:
-    stop = {"at": 0.5, "color": [1, 2, 3]}
-    assert (palette_table(coloring([stop, stop])) == [1, 2, 3]).all()
-
-
 def test_a_named_palette_is_turned_into_linear_light() -> None:
     table = palette_table(coloring("gray"))
     # sRGB 188/255 is linear 0.5029 (IEC 61966-2-1), and 10/255 lies on the straight part: (10/255)/12.92.
@@ -58,12 +53,6 @@ def test_a_named_palette_is_turned_into_linear_light() -> None:
 def test_the_table_is_the_callers_own() -> None:
     palette_table(coloring("viridis"))[:] = 0
     assert palette_table(coloring("viridis")).any()
-
-
-def test_an_unknown_name() -> None:
-    with pytest.raises(SceneError) as caught:
-        palette_table(coloring("infernoo"))
-    assert str(caught.value) == "coloring.palette: unknown palette 'infernoo'; did you mean 'inferno'?"
 
 
 @pytest.mark.parametrize("by", ["solid", "normal"])

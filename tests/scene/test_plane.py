@@ -12,8 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
-from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.load import dump_scene, load_scene
+from clfractal.scene.load import load_scene
 from clfractal.scene.rectangle import AXES, Axis, Placed, Plane, moved, rotated, scaled
 
 Floats = npt.NDArray[np.float64]
@@ -106,20 +105,6 @@ class TestMovingAbout:
         close(after.center, before.center if own else matrix @ np.array(before.center))
         assert (after.width, after.height) == (before.width, before.height)
 
-    @given(planes(), axes, degrees)
-    def test_rotations_keep_lengths_and_right_angles(self, some: Plane, axis: Axis, angle: float) -> None:
-        after = rotated(some.placed, axis, angle)
-        close(frame(after) @ frame(after).T, np.eye(3))
-        if axis in AXES:
-            assert np.linalg.norm(after.center) == pytest.approx(np.linalg.norm(some.center))
-
-    @given(planes(), axes, st.sampled_from([90, -90, 450]))
-    def test_four_quarter_turns_change_nothing(self, some: Plane, axis: Axis, angle: float) -> None:
-        before = some.placed
-        after = reduce(lambda p, _: rotated(p, axis, angle), range(4), before)
-        close(frame(after), frame(before))
-        close(after.center, before.center)
-
     @pytest.mark.parametrize("axis", AXES)
     def test_a_quarter_turn_about_an_axis_is_exact(self, axis: Axis) -> None:
         vectors_ = frame(rotated(plane().placed, axis, 90))
@@ -187,13 +172,6 @@ class TestTransform:
         close(by_keys.center, by_functions.center, at=1e-6)
         assert by_keys.width == pytest.approx(by_functions.width)
 
-    def test_the_order_matters(self) -> None:
-        turn_then_move = plane(transform=[{"rotate_x": 90}, {"move_normal": 1}]).placed
-        move_then_turn = plane(transform=[{"move_normal": 1}, {"rotate_side": 90}]).placed
-        assert turn_then_move.normal == move_then_turn.normal == (0, -1, 0)
-        assert turn_then_move.center == (0, -1, 0)
-        assert move_then_turn.center == (0, 0, 1)
-
 
 def scene_text(plane_text: str, colors: str = "{}") -> str:
     return (
@@ -246,31 +224,3 @@ def test_what_is_refused(text: str, message: str) -> None:
     with pytest.raises(SceneError) as caught:
         load_scene(scene_text(text))
     assert message in str(caught.value)
-
-
-def test_a_scene_with_a_plane_loads_back() -> None:
-    text = scene_text("{corners: [[0, 0, 0], [2, 0, 0], [0, 1, 0]], transform: [{rotate_x: 30}, {scale: 2}]}")
-    scene = load_scene(text)
-    again = load_scene(dump_scene(scene))
-    assert again == scene
-    assert isinstance(again.renderer, CutPlaneRenderer)
-    assert again.renderer.plane.placed.width == 4
-
-
-class TestPalettes:
-    def test_an_unknown_one(self) -> None:
-        with pytest.raises(SceneError, match=r"6:\d+|7:\d+") as caught:
-            load_scene(scene_text("{}", "{palette: viridos}"))
-        told = str(caught.value)
-        assert told.startswith(
-            "scene:7:21: renderer.colors.palette: unknown palette 'viridos'; did you mean 'viridis'"
-        )
-
-    def test_stops_out_of_order(self) -> None:
-        stops = "[{at: 0.5, color: [0, 0, 0]}, {at: 0.2, color: [1, 1, 1]}]"
-        with pytest.raises(SceneError) as caught:
-            load_scene(scene_text("{}", f"{{palette: {stops}}}"))
-        assert (
-            "renderer.colors.palette.1.at: must be at least 0.5, the value at the stop before, got 0.2"
-            in str(caught.value)
-        )

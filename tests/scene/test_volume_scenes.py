@@ -15,7 +15,7 @@ from clfractal.engine.engine import Engine
 from clfractal.errors import DeviceError
 from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.load import dump_scene, load_scene
-from tests.scene.errors import error_of, marked
+from tests.scene.errors import cases, error_of, marked
 from tests.scenes import HEAD, scene_of
 
 VOLUME = "renderer: {type: volume, "
@@ -23,96 +23,63 @@ PLANE = "cut_planes: [{"
 
 # In the texts below the sign § stands where the message must point to.
 CASES = [
-    # The box and its zooms.
-    (VOLUME + "box: {size: §0}}", "renderer.box.size: must be above 0, got 0"),
-    (VOLUME + "box: {size: §-2}}", "renderer.box.size: must be above 0, got -2"),
-    (VOLUME + "box: {size: [1, §0, 1]}}", "renderer.box.size.1: must be above 0, got 0"),
-    (VOLUME + "box: {size: [1, 1, §-1]}}", "renderer.box.size.2: must be above 0, got -1"),
-    (VOLUME + "box: {size: §[1, 2]}}", "renderer.box.size: must be a list of 3 numbers, got a list of 2"),
-    (VOLUME + "box: {§centre: [0, 0, 0]}}", "renderer.box: unknown key 'centre'; did you mean 'center'?"),
-    (
-        VOLUME + "box: {size: 2}, zoom: [{center: §[0.6, 0, 0], scale: 2}]}",
-        "renderer.zoom.0.center: the box must lie within the one before, -1 to 1, got 0.099999999999999978"
-        " to 1.1000000000000001",
+    *cases(
+        """
+# The box and its zooms.
+«VOLUME»box: {size: §0}} => renderer.box.size: must be above 0, got 0
+«VOLUME»box: {size: §-2}} => renderer.box.size: must be above 0, got -2
+«VOLUME»box: {size: [1, §0, 1]}} => renderer.box.size.1: must be above 0, got 0
+«VOLUME»box: {size: [1, 1, §-1]}} => renderer.box.size.2: must be above 0, got -1
+«VOLUME»box: {size: §[1, 2]}} => renderer.box.size: must be a list of 3 numbers, got a list of 2
+«VOLUME»box: {§centre: [0, 0, 0]}} => renderer.box: unknown key 'centre'; did you mean 'center'?
+«VOLUME»box: {size: 2}, zoom: [{center: §[0.6, 0, 0], scale: 2}]}
+=> renderer.zoom.0.center: the box must lie within the one before, -1 to 1, got 0.099999999999999978 to
+    1.1000000000000001
+«VOLUME»box: {size: 4}, zoom: [{center: [1, 0, 0], scale: 4}, {center: §[1, 0.4375, 0], scale: 4}]}
+=> renderer.zoom.1.center: the box must lie within the one before, -0.5 to 0.5, got 0.3125 to 0.5625
+«VOLUME»zoom: [{center: [0, 0, 0], scale: §0.5}]} => renderer.zoom.0.scale: must be at least 1, got 0.5
+«VOLUME»zoom: [§{scale: 2}]} => renderer.zoom.0.center: is missing
+# Resolution, steps, values.
+«VOLUME»resolution: §1} => renderer.resolution: must be at least 2, got 1
+«VOLUME»resolution: [64, 64, §1]} => renderer.resolution.2: must be at least 2, got 1
+«VOLUME»value: §insides} => renderer.value: must be inside, coverage or iterations, got 'insides'
+«VOLUME»normals: §exactly} => renderer.normals: must be gradient, least_squares or exact, got 'exactly'
+# What values look like.
+«VOLUME»transfer: {opacity: [{at: 1, opacity: 0}, {at: §0.5, opacity: 1}]}}
+=> renderer.transfer.opacity.1.at: must be at least 1, the value at the stop before, got 0.5
+«VOLUME»transfer: {color: [{at: 3, color: [0, 0, 0]}, {at: 4, color: [1, 1, 1]}, {at: §-1, color: [0, 0, 0]}]}}
+=> renderer.transfer.color.2.at: must be at least 4, the value at the stop before, got -1
+«VOLUME»transfer: {opacity: [{at: 0, opacity: §1.5}]}} => renderer.transfer.opacity.0.opacity: must be at most 1, got 1.5
+«VOLUME»transfer: {opacity: [§{at: 0}]}} => renderer.transfer.opacity.0.opacity: is missing
+«VOLUME»resolution: 64}
+coloring: {by: §iterations}
+=> coloring.by: must be solid or normal for a volume, got iterations; renderer.transfer.color colours values
+# The level of a surface.
+«VOLUME»level: §0} => renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 0
+«VOLUME»level: §1.5, value: coverage}
+=> renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 1.5
+renderer: {type: volume, value: iterations, level: §30.5}
+=> renderer.level: must be above 0 and at most 30, the ends of the grid's values, got 30.5
+«VOLUME»level: §0.5, transfer: {opacity: [{at: 0, opacity: 0}]}}
+=> renderer.level: applies to a surface, but transfer.opacity shows all values; remove one of them
+«VOLUME»level: §.nan} => renderer.level: must be a finite number, got .nan
+# Cut planes.
+«PLANE»colors: {palette: §magmaa}}] => cut_planes.0.colors.palette: unknown palette 'magmaa'; did you mean 'magma'?
+cut_planes: §[{count: 60}, {count: 5}] => cut_planes: must be at most 64 planes in total, got 65
+renderer: {type: cut_plane}
+cut_planes: §[{}] => cut_planes: are for surface and volume renderers; remove them
+«PLANE»count: §0}] => cut_planes.0.count: must be at least 1, got 0
+«PLANE»plane: {normal: §[0, 0, 0]}}] => cut_planes.0.plane.normal: must not be zero
+«PLANE»plane: {normal: [0, 0, 1], up: §[0, 0, 2]}}] => cut_planes.0.plane.up: must not be parallel to the normal
+«PLANE»colors: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0, color: [0, 0, 0]}]}}]
+=> cut_planes.0.colors.palette.1.at: must be at least 1, the value at the stop before, got 0
+# Files.
+«VOLUME»file: §''} => renderer.file: must not be empty, got ''
+""",
+        PLANE=PLANE,
+        VOLUME=VOLUME,
     ),
-    (
-        VOLUME
-        + "box: {size: 4}, zoom: [{center: [1, 0, 0], scale: 4}, {center: §[1, 0.4375, 0], scale: 4}]}",
-        "renderer.zoom.1.center: the box must lie within the one before, -0.5 to 0.5, got 0.3125 to 0.5625",
-    ),
-    (
-        VOLUME + "zoom: [{center: [0, 0, 0], scale: §0.5}]}",
-        "renderer.zoom.0.scale: must be at least 1, got 0.5",
-    ),
-    (VOLUME + "zoom: [§{scale: 2}]}", "renderer.zoom.0.center: is missing"),
-    # Resolution, steps, values.
-    (VOLUME + "resolution: §1}", "renderer.resolution: must be at least 2, got 1"),
-    (VOLUME + "resolution: [64, 64, §1]}", "renderer.resolution.2: must be at least 2, got 1"),
-    (VOLUME + "value: §insides}", "renderer.value: must be inside, coverage or iterations, got 'insides'"),
-    (
-        VOLUME + "normals: §exactly}",
-        "renderer.normals: must be gradient, least_squares or exact, got 'exactly'",
-    ),
-    # What values look like.
-    (
-        VOLUME + "transfer: {opacity: [{at: 1, opacity: 0}, {at: §0.5, opacity: 1}]}}",
-        "renderer.transfer.opacity.1.at: must be at least 1, the value at the stop before, got 0.5",
-    ),
-    (
-        VOLUME + "transfer: {color: [{at: 3, color: [0, 0, 0]}, {at: 4, color: [1, 1, 1]},"
-        " {at: §-1, color: [0, 0, 0]}]}}",
-        "renderer.transfer.color.2.at: must be at least 4, the value at the stop before, got -1",
-    ),
-    (
-        VOLUME + "transfer: {opacity: [{at: 0, opacity: §1.5}]}}",
-        "renderer.transfer.opacity.0.opacity: must be at most 1, got 1.5",
-    ),
-    (VOLUME + "transfer: {opacity: [§{at: 0}]}}", "renderer.transfer.opacity.0.opacity: is missing"),
-    (
-        VOLUME + "resolution: 64}\ncoloring: {by: §iterations}",
-        "coloring.by: must be solid or normal for a volume, got iterations; renderer.transfer.color colours values",
-    ),
-    # The level of a surface.
-    (
-        VOLUME + "level: §0}",
-        "renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 0",
-    ),
-    (
-        VOLUME + "level: §1.5, value: coverage}",
-        "renderer.level: must be above 0 and at most 1, the ends of the grid's values, got 1.5",
-    ),
-    (
-        "renderer: {type: volume, value: iterations, level: §30.5}",
-        "renderer.level: must be above 0 and at most 30, the ends of the grid's values, got 30.5",
-    ),
-    (
-        VOLUME + "level: §0.5, transfer: {opacity: [{at: 0, opacity: 0}]}}",
-        "renderer.level: applies to a surface, but transfer.opacity shows all values; remove one of them",
-    ),
-    (VOLUME + "level: §.nan}", "renderer.level: must be a finite number, got .nan"),
-    # Cut planes.
-    (
-        PLANE + "colors: {palette: §magmaa}}]",
-        "cut_planes.0.colors.palette: unknown palette 'magmaa'; did you mean 'magma'?",
-    ),
-    ("cut_planes: §[{count: 60}, {count: 5}]", "cut_planes: must be at most 64 planes in total, got 65"),
     ("cut_planes: §[" + "{}, " * 65 + "]", "cut_planes: must have at most 64 entries, got 65"),
-    (
-        "renderer: {type: cut_plane}\ncut_planes: §[{}]",
-        "cut_planes: are for surface and volume renderers; remove them",
-    ),
-    (PLANE + "count: §0}]", "cut_planes.0.count: must be at least 1, got 0"),
-    (PLANE + "plane: {normal: §[0, 0, 0]}}]", "cut_planes.0.plane.normal: must not be zero"),
-    (
-        PLANE + "plane: {normal: [0, 0, 1], up: §[0, 0, 2]}}]",
-        "cut_planes.0.plane.up: must not be parallel to the normal",
-    ),
-    (
-        PLANE + "colors: {palette: [{at: 1, color: [0, 0, 0]}, {at: §0, color: [0, 0, 0]}]}}]",
-        "cut_planes.0.colors.palette.1.at: must be at least 1, the value at the stop before, got 0",
-    ),
-    # Files.
-    (VOLUME + "file: §''}", "renderer.file: must not be empty, got ''"),
 ]
 
 
@@ -142,18 +109,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.parametrize(
     ("name", "message"),
-    [
-        ("missing.nrrd", "missing.nrrd cannot be read: No such file or directory"),
-        ("short.nrrd", "is cut short: 7 x 6 x 5 voxels need 840 bytes, it has 830"),
-        ("text.nrrd", "is neither a NRRD nor a NPY file"),
-        (
-            "hostile.nrrd",
-            "is cut short: 99,999 x 99,999 x 99,999 voxels need 3,999,880,001,199,996 bytes, it has 4",
-        ),
-        ("../beside.nrrd", "must be a path inside the scene's folder, got '../beside.nrrd'"),
-        ("other.nrrd", "leads out of the scene's folder: 'other.nrrd'"),
-        ("/etc/hostname", "must be a path inside the scene's folder, got '/etc/hostname'"),
-    ],
+    cases(
+        """
+missing.nrrd => missing.nrrd cannot be read: No such file or directory
+short.nrrd => is cut short: 7 x 6 x 5 voxels need 840 bytes, it has 830
+text.nrrd => is neither a NRRD nor a NPY file
+hostile.nrrd => is cut short: 99,999 x 99,999 x 99,999 voxels need 3,999,880,001,199,996 bytes, it has 4
+../beside.nrrd => must be a path inside the scene's folder, got '../beside.nrrd'
+other.nrrd => leads out of the scene's folder: 'other.nrrd'
+/etc/hostname => must be a path inside the scene's folder, got '/etc/hostname'
+"""
+    ),
 )
 def test_files(folder: Path, name: str, message: str) -> None:
     text, place = marked(f"{HEAD}{VOLUME}file: §{name}}}\n")
