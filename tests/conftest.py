@@ -12,6 +12,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 
 from clfractal.device import drivers_folder
+from clfractal.device.select import Device, choose
 
 if TYPE_CHECKING:
     from tests.shell import InProcess
@@ -53,6 +54,12 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     kept = set(random.Random(config.getoption("--seed")).sample(range(len(items)), count))
     config.hook.pytest_deselected(items=[item for index, item in enumerate(items) if index not in kept])
     items[:] = [item for index, item in enumerate(items) if index in kept]
+
+
+@pytest.fixture(scope="session")
+def device() -> Device:
+    """The device that pictures are rendered on: the one users get, or CLFRACTAL_DEVICE."""
+    return choose()
 
 
 @pytest.fixture

@@ -5,14 +5,9 @@ from __future__ import annotations
 import pytest
 
 import clfractal
-from clfractal.device.select import Device, choose
+from clfractal.device.select import Device
 from clfractal.images.framebuffer import Framebuffer
 from tests.render.shots import engine_of
-
-
-@pytest.fixture(scope="module")
-def device() -> Device:
-    return choose()
 
 
 def test_an_engine_has_previews_as_looks(device: Device) -> None:

@@ -28,14 +28,7 @@ TOLD = re.compile(r".*: (\d+) programs, (\d+) of them compiled now; [\d.]+ s, th
 # Scenes that take two small programs each.
 SCENES = {
     f"{name}.yaml": f"version: 1\nformula: {{name: {name}}}\ncamera: {{}}\nrenderer: {{type: cut_plane}}\n"
-    for name in (
-        "mandelbulb",
-        "mandelbox",
-        "hast",
-        "menger_sponge",
-        "quaternion_julia",
-        "sierpinski_tetrahedron",
-    )
+    for name in ("mandelbulb", "mandelbox", "hast")
 }
 
 

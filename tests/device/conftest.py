@@ -1,4 +1,4 @@
-"""The device that tests run on (the one users get, or CLFRACTAL_DEVICE) and a cache folder of their own."""
+"""A cache folder of the tests' own, and children that find the tests."""
 
 from __future__ import annotations
 
@@ -8,12 +8,7 @@ from pathlib import Path
 import pytest
 
 from clfractal.device import cache
-from clfractal.device.select import Device, choose
-
-
-@pytest.fixture(scope="session")
-def device() -> Device:
-    return choose()
+from clfractal.device.select import Device
 
 
 @pytest.fixture

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import math
 import pickle
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -26,6 +25,13 @@ CAMERA: dict[str, Any] = {"position": [0, -3, 0], "target": [0, 0, 0], "fov": 50
 SIZE = (96, 64)
 FINE = {"type": "surface", "detail": 0.02}
 STEREO = {"screen_width": 0.6, "screen_distance": 0.7}
+
+
+SCENE = """version: 1
+formula: {name: mandelbulb, iterations: 8}
+image: {width: 40, height: 36}
+camera: {position: [0, -3, 0]}
+"""
 
 
 @pytest.fixture
@@ -152,24 +158,14 @@ def test_films_of_two_eyes(engine: Engine) -> None:
     assert left.probe(48, 32).point != right.probe(48, 32).point
 
 
-@pytest.fixture
-def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(
-        "version: 1\nformula: {name: mandelbulb, iterations: 8}\nimage: {width: 40, height: 36}\n"
-        "camera: {position: [0, -3, 0]}\n"
-    )
-    return InProcess(capfd)
-
-
-def test_the_shell(shell: InProcess) -> None:
-    ended = shell("probe", "scene.yaml", "48,32", "--size", "96x64", "--json")
+def test_the_shell(clf: InProcess) -> None:
+    ended = clf("probe", "scene.yaml", "48,32", "--size", "96x64", "--json")
     assert ended.status == 0, ended
     told = json.loads(ended.out)
     assert told == clfractal.probe(
         with_size(clfractal.load_scene("scene.yaml"), (96, 64)), 48, 32
     ).plain() | {name: list(told[name]) for name in ("point", "normal")}
-    text = shell("probe", "scene.yaml", "20,18").out.splitlines()
+    text = clf("probe", "scene.yaml", "20,18").out.splitlines()
     assert text[0] == "pixel 20,18"
     assert [line.split()[0] for line in text[1:]] == [
         "point",
@@ -179,7 +175,7 @@ def test_the_shell(shell: InProcess) -> None:
         "iterations",
         "steps",
     ]
-    assert shell("probe", "scene.yaml", "0,0").out == "pixel 0,0: nothing is there\n"
+    assert clf("probe", "scene.yaml", "0,0").out == "pixel 0,0: nothing is there\n"
 
 
 @pytest.mark.parametrize(
@@ -190,8 +186,8 @@ def test_the_shell(shell: InProcess) -> None:
         ("a,b", "X,Y: must be X,Y, such as 640,360; got 'a,b'"),
     ],
 )
-def test_pixels_that_are_not_there(pixel: str, message: str, shell: InProcess) -> None:
-    assert shell("probe", "scene.yaml", pixel).is_one_line(2, message)
+def test_pixels_that_are_not_there(pixel: str, message: str, clf: InProcess) -> None:
+    assert clf("probe", "scene.yaml", pixel).is_one_line(2, message)
     layout = "layout={columns: 2, gap: 4, views: [{}, {}]}"
     between = "scene.yaml: the pixel 20,18 lies between the views of the layout"
-    assert shell("probe", "scene.yaml", "20,18", "--set", layout).is_one_line(2, between)
+    assert clf("probe", "scene.yaml", "20,18", "--set", layout).is_one_line(2, between)

@@ -229,42 +229,35 @@ def test_they_travel_with_the_film(engine: Engine) -> None:
     assert pickle.loads(pickle.dumps(framebuffer)).remarks == framebuffer.remarks != ()
 
 
-SHELL_SCENE = """version: 1
+SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 8}
 image: {width: 96, height: 64}
 camera: {position: [0, -3, 0]}
 """
 
 
-@pytest.fixture
-def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> InProcess:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SHELL_SCENE)
-    return InProcess(capfd)
-
-
-def rendered(shell: InProcess, *options: str) -> tuple[list[str], Ended]:
+def rendered(clf: InProcess, *options: str) -> tuple[list[str], Ended]:
     """What `--stats` holds, and how the command ended."""
-    ended = shell("render", "scene.yaml", "-o", "a.exr", "--stats", "a.json", *options)
+    ended = clf("render", "scene.yaml", "-o", "a.exr", "--stats", "a.json", *options)
     assert ended.status == 0, ended
     assert ended.out == ""
     return list(json.loads(Path("a.json").read_text())["remarks"]), ended
 
 
-def test_the_shell_tells_them(shell: InProcess) -> None:
+def test_the_shell_tells_them(clf: InProcess) -> None:
     away = ("--set", "camera.target=[0, -8, 0]")
-    remarks, ended = rendered(shell, *away)
+    remarks, ended = rendered(clf, *away)
     one(tuple(remarks), "no ray meets the set")
     assert f"scene.yaml: {remarks[0]}" in ended.err.splitlines()
-    assert rendered(shell, *away, "--quiet")[1].err == ""
-    remarks, ended = rendered(shell)
+    assert rendered(clf, *away, "--quiet")[1].err == ""
+    remarks, ended = rendered(clf)
     assert remarks == []
     assert "scene.yaml:" not in ended.err
 
 
 @pytest.mark.parametrize("channels", ["[R, G, B, A]", "[R, G, B, Z]", "[R, G, B]"])
 def test_a_resumed_picture_is_looked_at_as_a_whole(
-    channels: str, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+    channels: str, clf: InProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The set is in the tiles that the first run has finished; the second run sees but the background around it."""
     small = (
@@ -277,9 +270,9 @@ def test_a_resumed_picture_is_looked_at_as_a_whole(
     with monkeypatch.context() as patched:
         patched.setattr(Reporter, "__call__", _interrupted)
         with pytest.raises(KeyboardInterrupt):
-            shell("render", "scene.yaml", "-o", "a.exr", *options)
+            clf("render", "scene.yaml", "-o", "a.exr", *options)
     assert Path("a.exr.partial").exists()
-    remarks, _ = rendered(shell, *options, "--resume")
+    remarks, _ = rendered(clf, *options, "--resume")
     found = json.loads(Path("a.json").read_text())
     assert 0 < found["tiles_resumed"] < found["tiles"]
     assert found["hits"] == 0

@@ -18,13 +18,6 @@ from tests.scenes import scene_of
 from tests.voxels.grids import filled
 
 
-@pytest.fixture(scope="module")
-def device() -> Device:
-    from tests.devices import device as chosen
-
-    return chosen()
-
-
 def seen(scene: Scene, device: Device, **settings: Any) -> tuple[Floats, Floats]:
     """Places of hits where the formula is evaluated, and the normals there, length 1."""
     framebuffer = shoot(scene, device, **settings)
