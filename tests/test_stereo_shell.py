@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -18,25 +18,13 @@ from clfractal.files.png import read_texts
 from clfractal.images.compose import compose
 from clfractal.images.modes import picture_size
 from clfractal.scene.load import load_scene
-from clfractal.scene.stereo import Stereo
+from clfractal.scene.stereo import APART, Mode, Stereo
 from tests.shell import SCENE, InProcess
 
 MONO = SCENE + "output:\n  precision: {R: float, G: float, B: float}\n"
 STEREO = MONO + "stereo: {separation: 0.3}\n"
 SIZE = (40, 36)
-COMPOSED = [
-    "left",
-    "right",
-    "split",
-    "over_under",
-    "split_half",
-    "over_under_half",
-    "rows",
-    "columns",
-    "checkerboard",
-    "anaglyph_chessboard",
-    "anaglyph",
-]
+COMPOSED = [mode for mode in get_args(Mode) if mode not in APART]
 Planes = dict[str, npt.NDArray[Any]]
 
 

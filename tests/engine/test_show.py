@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -22,23 +22,11 @@ from clfractal.files.tone import toned
 from clfractal.files.tone_names import TONES, Tone
 from clfractal.images.outputs import png_bytes
 from clfractal.images.tiled import Floats
-from clfractal.scene.stereo import APART, Stereo
+from clfractal.scene.stereo import APART, Mode, Stereo
 from tests.engine.canvases import LAYOUT, drawn, framebuffers_of, job_of, look_of, painted, scene_of, shown
 from tests.scenes import STEREO
 
-COMPOSED = (
-    "split",
-    "split_half",
-    "over_under",
-    "over_under_half",
-    "rows",
-    "columns",
-    "checkerboard",
-    "anaglyph_chessboard",
-    "anaglyph",
-    "left",
-    "right",
-)
+COMPOSED = tuple(mode for mode in get_args(Mode) if mode not in APART)
 METHODS = ("color", "half_color", "gray", "dubois")
 GLASSES = ("red_cyan", "green_magenta", "amber_blue")
 CASES: dict[str, tuple[str, ...]] = {

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -10,7 +9,6 @@ from hypothesis import strategies as st
 pytest.importorskip("imgui_bundle")
 
 from clfractal.viewer.panels import color_button
-from tests.viewer.fields import BOX, stage_of
 
 pytestmark = pytest.mark.usefixtures("drawing_context")
 
@@ -37,16 +35,3 @@ def test_brightness_beyond_the_screen_is_kept_while_a_hue_is_picked(color: list[
     codes, gain = color_button.shown(color)
     turned = color_button.linear((codes[1], codes[2], codes[0]), gain)
     assert max(turned) == pytest.approx(max(color), rel=1e-5, abs=1e-6)
-
-
-def test_a_colour_is_picked_as_one_step() -> None:
-    stage = stage_of("material.color")
-    before = stage.ui.studio.scene
-    stage.click(*BOX)
-    x, y = BOX[0] + 60, BOX[1] + 60
-    stage.drag((x, y), (x + 40, y + 30))
-    after = stage.ui.studio.scene
-    assert after.material.color != before.material.color
-    assert np.all(np.array(after.material.color) <= 1)
-    assert stage.ui.studio.undo("scene")
-    assert stage.ui.studio.scene == before

@@ -266,21 +266,6 @@ def test_a_light_is_dragged(hand: Hand) -> None:
 @pytest.mark.parametrize(
     "hand", [("renderer={type: volume, resolution: 16}", "coloring.by=solid")], indirect=True
 )
-def test_the_zoom_box_begins_at_the_surface_under_the_pointer(hand: Hand) -> None:
-    aim = hand.aim(70, 44)
-    hand.controls.mark(aim)
-    assert hand.controls.box is not None
-    assert hand.controls.box.center == pytest.approx(aim.point)
-    scale = hand.controls.box.scale
-    hand.controls.mark()
-    hand.controls.mark(hand.aim(1, 1))  # nothing is there: it stays where it was
-    assert hand.controls.box.center == pytest.approx(aim.point)
-    assert hand.controls.box.scale == scale
-
-
-@pytest.mark.parametrize(
-    "hand", [("renderer={type: volume, resolution: 16}", "coloring.by=solid")], indirect=True
-)
 def test_the_zoom_box_is_moved_applied_and_stepped_back(hand: Hand) -> None:
     hand.controls.mark()
     box = hand.controls.box

@@ -116,57 +116,43 @@ def unsave(ui: Ui) -> None:
     assert ui.studio.unsaved
 
 
-def test_nothing_is_asked_at_first(asked: Asked) -> None:
+@pytest.mark.parametrize(
+    ("part", "verb", "typed", "name", "does"),
+    [
+        ("save", "Save", "mine.yaml", "mine.yaml", "save_as"),
+        ("save", "Save", "mine", "mine.yaml", "save_as"),
+        ("open", "Open", "other.yaml", "other.yaml", "open"),
+    ],
+)
+def test_a_name_is_asked_for_and_enter_does_it(
+    asked: Asked, tmp_path: Path, part: str, verb: str, typed: str, name: str, does: str
+) -> None:
     assert asked.shown() == set()
-
-
-def test_saving_asks_for_a_name_and_is_done_with_enter(asked: Asked, tmp_path: Path) -> None:
-    asked.ui.show.add("save")
-    assert asked.shown() == {"Save", "Cancel"}
-    asked.enter(str(tmp_path / "mine.yaml"))
-    assert asked.files.done == [("save_as", tmp_path / "mine.yaml")]
-    assert "save" not in asked.ui.show
-    assert asked.shown() == set()
-
-
-def test_the_suggested_name_is_taken_as_it_is(asked: Asked) -> None:
-    asked.ui.show.add("save")
-    asked.click("Save")
-    assert asked.files.done == [("save_as", asked.files.suggestion)]
-
-
-def test_a_name_without_ending_is_a_scene_file(asked: Asked, tmp_path: Path) -> None:
-    asked.ui.show.add("save")
-    asked.enter(str(tmp_path / "mine"))
-    assert asked.files.done == [("save_as", tmp_path / "mine.yaml")]
-
-
-def test_another_file_is_replaced_only_when_that_is_confirmed(asked: Asked, tmp_path: Path) -> None:
-    taken = tmp_path / "taken.yaml"
-    taken.write_text("of somebody else")
-    asked.files.suggestion = taken
-    asked.ui.show.add("save")
-    asked.click("Save")
-    assert asked.files.done == []
-    assert "save" in asked.ui.show
-    asked.click("Save")
-    assert asked.files.done == [("save_as", taken)]
+    asked.ui.show.add(part)
+    assert asked.shown() == {verb, "Cancel"}
+    asked.click("Cancel")
+    assert (asked.shown(), asked.files.done) == (set(), [])
+    asked.ui.show.add(part)
+    asked.enter(str(tmp_path / typed))
+    assert asked.files.done == [(does, tmp_path / name)]
+    assert part not in asked.ui.show
 
 
 def test_a_confirmation_counts_for_that_name_alone(asked: Asked, tmp_path: Path) -> None:
-    for name in ("one.yaml", "two.yaml"):
-        (tmp_path / name).write_text("of somebody else")
+    one, two = taken = [tmp_path / name for name in ("one.yaml", "two.yaml")]
+    for path in taken:
+        path.write_text("of somebody else")
+    asked.files.suggestion = one
+    for _ in range(2):  # the second time the question begins anew
+        asked.ui.show.add("save")
+        asked.click("Save")
+        assert (asked.files.done, "save" in asked.ui.show) == ([], True)
+        asked.click("Cancel")
     asked.ui.show.add("save")
-    asked.enter(str(tmp_path / "one.yaml"))
-    asked.click("Cancel")
-    asked.ui.show.add("save")
-    asked.enter(str(tmp_path / "one.yaml"))
-    assert asked.files.done == []  # the question began anew
-    asked.ui.show.discard("save")
-    asked.shown()
-    asked.ui.show.add("save")
-    asked.enter(str(tmp_path / "two.yaml"))
+    asked.enter(str(two))
     assert asked.files.done == []
+    asked.click("Save")
+    assert asked.files.done == [("save_as", two)]
 
 
 def test_the_scene_s_own_file_needs_no_confirmation(asked: Asked, tmp_path: Path) -> None:
@@ -190,20 +176,6 @@ def test_what_goes_wrong_is_told_and_the_question_stays(asked: Asked, part: str,
     asked.click(verb)
     assert len(asked.files.done) == 1
     assert part not in asked.ui.show
-
-
-def test_cancelling_does_nothing(asked: Asked) -> None:
-    for part in ("save", "open"):
-        asked.ui.show.add(part)
-        asked.click("Cancel")
-        assert part not in asked.ui.show
-    assert asked.files.done == []
-
-
-def test_opening_asks_for_a_file(asked: Asked, tmp_path: Path) -> None:
-    asked.ui.show.add("open")
-    asked.enter(str(tmp_path / "other.yaml"))
-    assert asked.files.done == [("open", tmp_path / "other.yaml")]
 
 
 def test_leaving_with_unsaved_changes(asked: Asked) -> None:

@@ -258,25 +258,6 @@ def test_what_an_edit_gives_can_be_rendered_and_written() -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "value"),
-    [
-        ("lights.1", {"direction": [1, 0, 0]}),
-        ("cut_planes.0", {"cut": True}),
-        ("bookmarks.here", {"position": [0, -3, 0]}),
-        ("fog.density", 0.2),
-        ("stereo.mode", "rows"),
-        ("coloring.stops", None),
-    ],
-)
-def test_what_is_not_there_is_made(path: str, value: Any) -> None:
-    """An index behind a list's end appends, a key of a section that is null begins it."""
-    scene = scene_of()
-    found = result(lambda: edited(scene, {path: value}))
-    if found[0] is not None:
-        assert value_at(found[0], path) is not None or value is None
-
-
-@pytest.mark.parametrize(
     "path", ["lights.2.intensity", "lights.x", "camera.position.9", "material.color.q", "a.b.c"]
 )
 def test_places_that_do_not_exist(path: str) -> None:

@@ -231,21 +231,22 @@ def test_a_cancelled_process_that_does_not_end_is_killed(tmp_path: Path, queue: 
     assert not (tmp_path / "ended").exists()
 
 
-def test_a_film_that_became_whole_just_before_the_window_ends_is_whole(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("program", "lines", "state"),
+    [
+        ("go('film')", [], (True, False, 6)),
+        ("sys.exit('out of memory')", ["out of memory"], (False, False, 0)),
+    ],
+)
+def test_a_film_that_ended_just_before_the_window_does(
+    tmp_path: Path, program: str, lines: list[str], state: tuple[bool, bool, int]
+) -> None:
     queue = FilmQueue()
-    film = queue.order(_stand_in(tmp_path, "go('film')"))
+    film = queue.order(_stand_in(tmp_path, program))
     assert film._process is not None
     film._process.wait()
-    assert queue.close() == []
-    assert (film.written, film.cancelled, film.done) == (True, False, 6)
-
-
-def test_a_film_that_failed_just_before_the_window_ends_tells_why(tmp_path: Path) -> None:
-    queue = FilmQueue()
-    film = queue.order(_stand_in(tmp_path, "sys.exit('out of memory')"))
-    assert film._process is not None
-    film._process.wait()
-    assert queue.close() == ["out of memory"]
+    assert queue.close() == lines
+    assert (film.written, film.cancelled, film.done) == state
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,6 @@ from clfractal.schema.kinds import members
 from clfractal.schema.shape import solids
 from clfractal.viewer.editing import edited
 from clfractal.viewer.panels import first, lights
-from clfractal.viewer.panels import objects as objects_panel
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.sight import Sight
 from tests.viewer.panel_clicks import Seen
@@ -122,18 +121,6 @@ def test_water_and_planes_are_level_as_the_camera_is(engine: Engine, monkeypatch
         )
         normal = np.array(ui.studio.scene.objects[kind].normal)  # type: ignore[attr-defined]
         assert normal @ [1, 0.01, 0] == pytest.approx(np.linalg.norm(normal), rel=1e-3)
-
-
-def test_without_a_picture_yet_objects_are_in_view() -> None:
-    ui, _ = make_ui(load_scene(SCENE))
-    scene = ui.studio.shown_scene
-    place = first.objects(ui)["sphere"]["position"]
-    matrix = scene_view(scene).world_to_ndc()
-    x, y, _, depth = np.append(place, 1.0) @ matrix
-    left, top, right, bottom = first.free(ui)
-    assert left < x / depth < right
-    assert top < y / depth < bottom
-    assert left > 0.2  # the dock
 
 
 # Lights
@@ -240,13 +227,3 @@ def test_set_lights_are_possible_on_every_set(engine: Engine) -> None:
         ui, _ = make_ui(scene)
         lights._add(ui, "set", [])
         assert [light.tag for light in ui.studio.scene.lights] == ["set"], ui.studio.problems
-
-
-def test_objects_are_added_by_their_buttons(monkeypatch: pytest.MonkeyPatch) -> None:
-    seen = Seen(monkeypatch)
-    ui, _ = make_ui(load_scene(SCENE))
-    stage = Stage(ui, objects_panel.draw)
-    for title in ("Sphere", "Plane", "Formula"):
-        seen.click(stage, title)
-    assert list(ui.studio.scene.objects) == ["sphere", "plane", "formula"]
-    assert ui.memory["object"] == "formula"

@@ -42,16 +42,6 @@ def test_enter_takes_what_was_searched_for(stage: Stage) -> None:
     assert not imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
 
 
-def test_arrows_go_through_the_list(stage: Stage) -> None:
-    names, start = _names(), _names().index("mandelbulb")
-    for _ in range(3):
-        stage.press(imgui.Key.down_arrow)
-    stage.press(imgui.Key.up_arrow)
-    assert stage.ui.studio.scene.formula.name == "mandelbulb"  # nothing is taken before Enter
-    stage.press(imgui.Key.keypad_enter)
-    assert stage.ui.studio.scene.formula.name == names[start + 2]
-
-
 def test_arrows_go_through_what_was_found_and_stop_at_its_ends(stage: Stage) -> None:
     stage.type("box")
     names = _names("box")

@@ -119,15 +119,6 @@ def test_an_edited_formula_keeps_values_that_still_fit() -> None:
         formula_editor.read_formula("title: x")
 
 
-def test_undo_brings_the_text_back() -> None:
-    ui, _ = make_ui("scenes/mandelbulb.yaml")
-    text = formula_editor.text_of(ui.studio.scene.formula)
-    state = typed(ui, text.replace("title: Mandelbulb", "title: Mine"))
-    assert ui.studio.undo("scene")
-    formula_editor._follow(ui, state)
-    assert "title: Mandelbulb" in state.editor.get_text()
-
-
 def test_the_editor_checks_when_nobody_types() -> None:
     ui, _ = make_ui("scenes/mandelbulb.yaml")
     ui.show.add("formula_editor")

@@ -168,12 +168,6 @@ def test_a_formula_is_saved_as_a_file_of_its_own(tmp_path: Path) -> None:
     assert (tmp_path / "mine.yaml").read_text() == text
 
 
-def test_a_formula_of_the_library_becomes_a_file(tmp_path: Path) -> None:
-    desk = Desk(tmp_path / "s.yaml", SCENE)
-    formula_editor.save_as_file(desk.ui, SimpleNamespace(text=desk.shown, source=None), ask("own.yml"))  # type: ignore[arg-type]
-    assert "{file: own.yml, iterations: 6, parameters: {power: 8}}" in desk.save()
-
-
 def test_files_that_are_there_and_names_that_are_none(tmp_path: Path) -> None:
     desk = Desk(tmp_path / "s.yaml", SCENE)
     (tmp_path / "taken.yaml").write_text("mine\n")
@@ -192,15 +186,3 @@ def test_files_that_are_there_and_names_that_are_none(tmp_path: Path) -> None:
     formula_editor.save_as_file(desk.ui, state, wanted)
     assert wanted["problem"] == ""
     assert (tmp_path / "taken.yaml").read_text() == desk.shown
-
-
-def test_a_scene_in_another_folder_holds_the_formula(tmp_path: Path) -> None:
-    """Only files in its folder, or below, can be named."""
-    desk = Desk(tmp_path / "s.yaml", SCENE)
-    text = desk.shown.replace("x*x + y*y\n", "x*x + y*y*1.  # mine\n")
-    desk.type(text)
-    formula_editor.save_as_file(desk.ui, SimpleNamespace(text=text, source=None), ask("mine"))  # type: ignore[arg-type]
-    (tmp_path / "other").mkdir()
-    studio = desk.ui.studio
-    save_scene(desk.source, studio.document, tmp_path / "other" / "t.yaml", texts=studio.formula_texts)
-    assert "# mine" in (tmp_path / "other" / "t.yaml").read_text()

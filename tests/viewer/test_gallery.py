@@ -79,6 +79,16 @@ def settle(ui: Ui, stage: Stage) -> gallery.Gallery:
     return state
 
 
+def plankton() -> tuple[Stage, gallery.Gallery, Any, list[Any]]:
+    """A gallery in which one scene was searched for: where it is drawn, its entry, and the pictures that were asked for."""
+    ui, _, tasks = opened()
+    ui.memory["gallery.filter"] = "plankton"
+    stage = Stage(ui, gallery.draw, window=False)
+    state = settle(ui, stage)
+    entry = next(entry for entry in state.shelf.entries if entry.path.stem == "volume_plankton")
+    return stage, state, entry, tasks
+
+
 # Scenes
 
 
@@ -122,23 +132,6 @@ def test_a_scene_that_is_wrong_tells_why_and_does_not_stop_the_others(tmp_path: 
 
 
 # Kept pictures
-
-
-def test_a_picture_that_was_kept_is_found_again_bit_for_bit() -> None:
-    first = shelf(FILES[:1])
-    assert first.entries[0].pixels is None
-    assert first.entries[0].key
-    first = Shelf(FILES[:1], "a device", lambda: None)
-    first.look(first.entries[0])
-    first._pool.submit(lambda: None).result(60)
-    first.entries[0].pixels = pixels()
-    first.keep(first.entries[0])
-    first.close()
-    again = shelf(FILES[:1]).entries[0].pixels
-    assert again is not None
-    assert np.array_equal(again, pixels())
-    assert shelf(FILES[:1], "another device").entries[0].pixels is None
-    assert shelf(FILES[1:2]).entries[0].pixels is None
 
 
 def test_a_changed_scene_gets_a_new_picture(tmp_path: Path) -> None:
@@ -236,35 +229,22 @@ def test_what_is_seen_no_more_is_given_up() -> None:
 
 
 def test_a_rendered_picture_is_shown_and_kept_and_not_rendered_again() -> None:
-    ui, _, tasks = opened()
-    ui.memory["gallery.filter"] = "plankton"
-    stage = Stage(ui, gallery.draw, window=False)
-    state = settle(ui, stage)
+    stage, state, entry, tasks = plankton()
     tasks[-1].pixels = pixels()
-    settle(ui, stage)
-    entry = next(entry for entry in state.shelf.entries if entry.path.stem == "volume_plankton")
+    settle(stage.ui, stage)
     assert entry.pixels is not None
     assert state.asked == set()
     state.shelf.close()
-    again, _, more = opened()
-    again.memory["gallery.filter"] = "plankton"
-    state = settle(again, Stage(again, gallery.draw, window=False))
-    entry = next(entry for entry in state.shelf.entries if entry.path.stem == "volume_plankton")
-    assert entry.pixels is not None
-    assert np.array_equal(entry.pixels, pixels())
+    _, _, again, more = plankton()
+    assert np.array_equal(again.pixels, pixels())
     assert more == []
 
 
 def test_a_picture_that_fails_is_told_and_not_tried_again() -> None:
-    ui, _, tasks = opened()
-    ui.memory["gallery.filter"] = "plankton"
-    stage = Stage(ui, gallery.draw, window=False)
-    state = settle(ui, stage)
+    stage, _, entry, tasks = plankton()
     tasks[-1].problem = "out of memory"
-    settle(ui, stage)
-    entry = next(entry for entry in state.shelf.entries if entry.path.stem == "volume_plankton")
-    assert entry.problem == "out of memory"
-    assert len(tasks) == 1
+    settle(stage.ui, stage)
+    assert (entry.problem, len(tasks)) == ("out of memory", 1)
 
 
 def test_a_click_opens_a_scene_and_closes_the_gallery(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -234,18 +234,6 @@ def test_a_segment_inside_the_picture_is_projected_as_its_ends_are(
     np.testing.assert_allclose(depths[0], (near, far), rtol=1e-9)
 
 
-def test_a_segment_that_passes_the_eye_ends_before_it() -> None:
-    view = camera_view(perspective(), *SIZE)
-    through = np.array([[[0.1, 0.0, 0.1], [0.1, -9.0, 0.1]], [[0.1, -4.0, 0.0], [0.1, -9.0, 0.0]]])
-    clipped, depths = overlays.clipped_with_depth(view, through, SIZE)
-    assert np.isfinite(clipped[0]).all()
-    assert_same_pixel(clipped[0, :2], project(view, through[0, 0], SIZE))
-    # It leaves at the upper edge, the nearest one.
-    assert clipped[0, 3] == pytest.approx(0, abs=1e-9)
-    assert 0 < depths[0, 1] < 3
-    assert np.isnan(clipped[1]).all()
-
-
 def test_nothing_and_infinite_segments_are_no_error() -> None:
     view = camera_view(perspective(), *SIZE)
     assert overlays.clipped_with_depth(view, np.zeros((0, 2, 3)), SIZE)[0].shape == (0, 4)
@@ -270,27 +258,6 @@ def test_the_back_of_a_box_is_hidden_by_a_wall_through_its_middle(camera: AnyCam
     wall[:, : wall.shape[1] // 2] = 0.5
     dim = overlays.hidden(view, pixels, depths, wall, SIZE)
     np.testing.assert_array_equal(dim, (pixels[:, 0] + pixels[:, 2]) / 2 < SIZE[0] / 2 - 1e-9)
-
-
-def test_a_segment_in_a_slanted_wall_is_in_the_wall_in_the_middle_of_its_picture() -> None:
-    view = camera_view(perspective(), *SIZE)
-    ends = np.array([[[-0.2, -2.0, 0.0], [3.0, 6.0, 0.0]]])
-    pixels, depths = overlays.clipped_with_depth(view, ends, SIZE)
-    middle = (pixels[0, :2] + pixels[0, 2:]) / 2
-    shown = _depth_on_line(ends[0], view, middle)
-    for part, dim in ((0.99, True), (1.01, False)):
-        wall = np.full((SIZE[1], SIZE[0]), shown * part)
-        assert overlays.hidden(view, pixels, depths, wall, SIZE)[0] == dim
-
-
-def _depth_on_line(ends: np.ndarray, view: View, place: np.ndarray) -> float:
-    """Depth of a segment's point that is shown at a place, found by halving."""
-    low, high = 0.0, 1.0
-    for _ in range(60):
-        part = (low + high) / 2
-        x, _, depth = project(view, ends[0] * (1 - part) + ends[1] * part, SIZE)
-        low, high = (part, high) if x < place[0] else (low, part)
-    return depth
 
 
 @given(st.tuples(*[numbers(-3, 3)] * 3), numbers(0.1, 4), directions)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -36,82 +37,44 @@ def fov(scene: Scene) -> float:
     return scene.camera.fov  # type: ignore[union-attr]
 
 
-def test_each_kind_has_its_own_stack() -> None:
+AMBIENT = BASE.material.ambient
+# What is done (a field of view, of a gesture; an ambient light; undo and redo); the steps of cameras; and what is there.
+STORIES: dict[str, tuple[list[Any], tuple[int, int], tuple[float, float]]] = {
+    "each kind has its own": ([30, 0.5, 40, "undo camera"], (1, 1), (30, 0.5)),
+    "and goes on by itself": (
+        [30, 0.5, 40, "undo camera", "undo scene", "redo camera"],
+        (2, 0),
+        (40, AMBIENT),
+    ),
+    "a drag is one step": (
+        [(31, "a"), (32, "a"), "seal", (33, "a"), (34, "a"), "undo camera"],
+        (1, 1),
+        (32, AMBIENT),
+    ),
+    "whatever is between": ([(31, "a"), 0.3, (32, "a"), "undo camera"], (0, 1), (fov(BASE), 0.3)),
+    "gestures are steps": ([(31, "a"), (32, "b"), 33, 34], (4, 0), (34, AMBIENT)),
+    "undone is done": ([(31, "a"), "undo camera", "redo camera", (32, "a")], (2, 0), (32, AMBIENT)),
+    "an edit forgets its kind": ([31, 0.3, "undo camera", "undo scene", 33, "redo scene"], (1, 0), (33, 0.3)),
+    "nothing is no step": ([fov(BASE)], (0, 0), (fov(BASE), AMBIENT)),
+}
+
+
+@pytest.mark.parametrize("story", STORIES)
+def test_steps(story: str) -> None:
     work = Edited()
-    work.edit("camera.fov", 30)
-    work.edit("material.ambient", 0.5)
-    work.edit("camera.fov", 40)
-    assert work.history.depth("camera") == (2, 0)
-    assert work.history.depth("scene") == (1, 0)
-    work.put(work.history.undo("camera"))
-    assert (fov(work.scene), work.scene.material.ambient) == (30, 0.5)
-    work.put(work.history.undo("scene"))
-    assert (fov(work.scene), work.scene.material.ambient) == (30, BASE.material.ambient)
-    work.put(work.history.redo("camera"))
-    assert (fov(work.scene), work.scene.material.ambient) == (40, BASE.material.ambient)
-    assert work.history.undo("scene") is None
-
-
-def test_a_drag_is_one_step() -> None:
-    work = Edited()
-    for value in (31, 32, 33):
-        work.edit("camera.fov", value, "drag")
-    work.history.seal()
-    for value in (34, 35):
-        work.edit("camera.fov", value, "drag")
-    work.put(work.history.undo("camera"))
-    assert fov(work.scene) == 33
-    work.put(work.history.undo("camera"))
-    assert work.scene == BASE
-    work.put(work.history.redo("camera"))
-    work.put(work.history.redo("camera"))
-    assert fov(work.scene) == 35
-
-
-def test_a_drag_goes_on_after_an_edit_of_the_other_stack() -> None:
-    work = Edited()
-    work.edit("camera.fov", 31, "orbit")
-    work.edit("material.ambient", 0.3)
-    work.edit("camera.fov", 32, "orbit")
-    assert work.history.depth("camera") == (1, 0)
-    work.put(work.history.undo("camera"))
-    assert (fov(work.scene), work.scene.material.ambient) == (fov(BASE), 0.3)
-
-
-def test_different_gestures_are_different_steps() -> None:
-    work = Edited()
-    work.edit("camera.fov", 31, "orbit")
-    work.edit("camera.fov", 32, "pan")
-    work.edit("camera.fov", 33)
-    work.edit("camera.fov", 34)
-    assert work.history.depth("camera") == (4, 0)
-
-
-def test_a_drag_does_not_join_a_step_that_was_undone_and_repeated() -> None:
-    work = Edited()
-    work.edit("camera.fov", 31, "drag")
-    work.put(work.history.undo("camera"))
-    work.put(work.history.redo("camera"))
-    work.edit("camera.fov", 32, "drag")
-    assert work.history.depth("camera") == (2, 0)
-
-
-def test_an_edit_forgets_what_was_undone_of_its_kind() -> None:
-    work = Edited()
-    work.edit("camera.fov", 31)
-    work.edit("material.ambient", 0.3)
-    work.put(work.history.undo("camera"))
-    work.put(work.history.undo("scene"))
-    work.edit("camera.fov", 33)
-    assert work.history.redo("camera") is None
-    assert work.put(work.history.redo("scene"))
-    assert work.scene.material.ambient == 0.3
-
-
-def test_an_edit_that_changes_nothing_is_no_step() -> None:
-    work = Edited()
-    work.edit("camera.fov", fov(BASE))
-    assert work.history.depth("camera") == (0, 0)
+    done, depth, found = STORIES[story]
+    for what in done:
+        if isinstance(what, str) and what != "seal":
+            way, kind = what.split()
+            assert work.put(getattr(work.history, way)(kind))
+        elif what == "seal":
+            work.history.seal()
+        elif isinstance(what, float) and what < 1:
+            work.edit("material.ambient", what)
+        else:
+            work.edit("camera.fov", *(what if isinstance(what, tuple) else (what,)))
+    assert work.history.depth("camera") == depth
+    assert (fov(work.scene), work.scene.material.ambient) == found
 
 
 def test_memory_is_limited() -> None:

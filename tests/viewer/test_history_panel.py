@@ -58,18 +58,6 @@ def test_any_step_can_be_gone_to(places: list[int]) -> None:
         assert ui.studio.scene.camera.fov == 33.0  # type: ignore[union-attr]
 
 
-def test_the_order_of_steps_does_not_depend_on_how_many_are_undone() -> None:
-    ui, _ = make_ui(SCENE)
-    steps(ui, 4)
-    told = [history.label(step) for step in ui.studio.history.steps("scene")[0]]
-    assert told == [f"Formula: iterations {number}" for number in range(20, 24)]
-    for undone in range(1, 5):
-        ui.studio.undo("scene")
-        found, now = ui.studio.history.steps("scene")
-        assert [history.label(step) for step in found] == told
-        assert now == 4 - undone
-
-
 def test_steps_are_told_in_words() -> None:
     ui, _ = make_ui(SCENE)
     camera = ui.studio.value("camera")

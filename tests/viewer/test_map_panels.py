@@ -37,19 +37,6 @@ def opened() -> Ui:
     return ui
 
 
-def test_drawing_changes_nothing() -> None:
-    ui = opened()
-    before = ui.studio.scene
-    Stage(ui, scene_dock.draw, window=False)
-    assert ui.studio.scene is before
-    # An object's material as well.
-    assert ui.studio.edit({"objects.ball": {"material": "gold"}, "lighting": {"mode": "path"}})
-    ui.memory["object"] = "ball"
-    before = ui.studio.scene
-    Stage(ui, scene_dock.draw, window=False)
-    assert ui.studio.scene is before
-
-
 def test_palettes_and_curves_are_edited() -> None:
     ui = opened()
     path = "materials.gold.base"

@@ -12,7 +12,6 @@ pytest.importorskip("imgui_bundle")
 
 from imgui_bundle import imgui
 
-from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import load_scene
 from clfractal.scene.objects import VolumeObject
 from clfractal.scene.rectangle import rotated
@@ -168,17 +167,3 @@ def test_a_volume_is_a_surface_or_a_cloud(tmp_path: Path) -> None:
     assert not again.is_cloud
     assert not ui.studio.edit({"objects.volume.level": 59.5})
     assert ui.studio.edit({"objects.volume.level": 10.0})
-
-
-def test_the_cut_alone_and_back() -> None:
-    ui, _ = make_ui("scenes/cut_geode.yaml")
-    shown = ui.studio.scene.cut_planes[0]
-    changes = {
-        "renderer.plane": shown.plane.model_dump(mode="json"),
-        "renderer.colors": shown.colors.model_dump(mode="json"),
-    }
-    assert renderer.switch(ui, "cut_plane", changes)
-    made = ui.studio.scene.renderer
-    assert isinstance(made, CutPlaneRenderer)
-    assert made.plane == shown.plane
-    assert made.colors == shown.colors

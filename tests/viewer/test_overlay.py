@@ -71,59 +71,59 @@ def frame(ui: Ui, **changes: Any) -> None:
     ui.studio.session.paused = False
 
 
-def test_a_picture_s_figures() -> None:
+FRAME = {"frames": None, "device": "Processor of the tests", "number": "float32"}
+SHARED = {"frames": "30/s", "picture": "shared", "samples": "3 of 16", "size": "640 x 360", "render": "2.5 s"}
+
+
+@pytest.mark.parametrize(
+    ("changes", "paused", "speed", "figures"),
+    [
+        ({}, False, Speed(29.6, "shared"), {**FRAME, **SHARED}),
+        ({"divider": 4, "samples": 1}, False, None, {**FRAME, "size": "640 x 360, 1/4", "render": "12 ms"}),
+        ({}, True, None, {**FRAME, "samples": "3 of 16, paused"}),
+        ({"samples": 16, "finished": True}, True, None, {**FRAME, "samples": "16 of 16"}),
+    ],
+    ids=["moving", "coarse", "paused", "finished"],
+)
+def test_a_picture_s_figures(
+    changes: dict[str, Any], paused: bool, speed: Speed | None, figures: dict[str, str | None]
+) -> None:
     ui = ui_of(BULB)
-    ui.speed = Speed(29.6, "shared")
-    frame(ui)
-    found = told(ui)
-    assert found["render"] == "2.5 s"
-    assert found["frames"] == "30/s"
-    assert found["samples"] == "3 of 16"
-    assert found["size"] == "640 x 360"
-    assert found["number"] == "float32"
-    assert found["picture"] == "shared"
-    assert found["device"] == "Processor of the tests"
+    if speed is not None:
+        ui.speed = speed
+    frame(ui, **changes)
+    ui.studio.session.paused = paused
+    assert {name: told(ui).get(name) for name in figures} == figures
 
 
-def test_a_coarse_picture_tells_its_divider_and_its_own_time() -> None:
+@pytest.mark.parametrize(
+    ("text", "figures"),
+    [
+        (BULB, {"method": "distance, gradient", "step": "1 px", "iterations": "9", "render": None}),
+        (
+            BULB + "renderer: {search: steps, step: 0.02, normal: least_squares}\n",
+            {"method": "steps, least squares", "step": "0.02"},
+        ),
+        # The step is null: the hundredth part of the bounds' radius.
+        (BULB + "renderer: {search: steps, bounds: {radius: 3.5}}\n", {"step": "0.035"}),
+        (VOLUME, {"method": "volume, inside, gradient"}),
+        (PLANE, {"method": "cut plane"}),
+    ],
+)
+def test_a_scene_s_figures(text: str, figures: dict[str, str | None]) -> None:
+    found = told(ui_of(text))
+    assert {name: found.get(name) for name in figures} == figures
+    assert text != PLANE or "2.5" in found["plane"]
+
+
+def test_depth_and_place_under_the_pointer() -> None:
     ui = ui_of(BULB)
-    frame(ui, divider=4, samples=1)
-    found = told(ui)
-    assert found["size"].endswith("1/4")
-    assert found["render"] == "12 ms"
-    assert "frames" not in found  # nothing moves
-
-
-def test_a_paused_picture_says_so_until_it_is_finished() -> None:
-    ui = ui_of(BULB)
-    frame(ui)
-    ui.studio.session.paused = True
-    assert told(ui)["samples"] == "3 of 16, paused"
-    frame(ui, samples=16, finished=True)
-    ui.studio.session.paused = True
-    assert told(ui)["samples"] == "16 of 16"
-
-
-def test_without_a_frame_there_is_still_what_the_scene_tells() -> None:
-    found = told(ui_of(BULB))
-    assert found["iterations"] == "9"
-    assert "render" not in found
-
-
-def test_the_method_follows_the_renderer() -> None:
-    surface = told(ui_of(BULB))
-    assert (surface["method"], surface["step"]) == ("distance, gradient", "1 px")
-    steps = told(ui_of(BULB + "renderer: {search: steps, step: 0.02, normal: least_squares}\n"))
-    assert (steps["method"], steps["step"]) == ("steps, least squares", "0.02")
-    assert told(ui_of(VOLUME))["method"] == "volume, inside, gradient"
-    assert told(ui_of(PLANE))["method"] == "cut plane"
-    assert "2.5" in told(ui_of(PLANE))["plane"]
-
-
-def test_a_fixed_search_without_a_step_has_figures_too() -> None:
-    """Its step is null: the hundredth part of the bounds' radius."""
-    ui = ui_of(BULB + "renderer: {search: steps, bounds: {radius: 3.5}}\n")
-    assert told(ui)["step"] == "0.035"
+    found = [told(ui)]
+    for point, depth in (((0.5, -1.25, 0.125), 1.75), (None, float("inf"))):
+        pick_at(ui, point, depth)
+        found.append(told(ui))
+    assert [each["depth"] for each in found] == ["-", "1.75", "-"]
+    assert [each.get("point") for each in found[1:]] == ["0.5, -1.25, 0.125", None]
 
 
 def test_a_volume_tells_its_zoom_and_the_next_one() -> None:
@@ -141,17 +141,6 @@ def pick_at(ui: Ui, point: tuple[float, float, float] | None, depth: float) -> N
     """Puts the pointer over a point of the scene."""
     view = SimpleNamespace(scene=ui.studio.scene)
     ui.pick = SimpleNamespace(point=point, depth=depth, view=view)  # type: ignore[assignment]
-
-
-def test_depth_and_place_under_the_pointer() -> None:
-    ui = ui_of(BULB)
-    assert told(ui)["depth"] == "-"
-    pick_at(ui, (0.5, -1.25, 0.125), 1.75)
-    assert told(ui)["depth"] == "1.75"
-    assert told(ui)["point"] == "0.5, -1.25, 0.125"
-    pick_at(ui, None, float("inf"))
-    assert told(ui)["depth"] == "-"
-    assert "point" not in told(ui)
 
 
 def test_stereo_tells_mode_distances_and_parallax() -> None:

@@ -65,28 +65,18 @@ def test_what_the_user_sets_is_where_the_next_begins() -> None:
     assert desk.width == 1.5
 
 
-def test_a_window_over_screens_has_the_scenes() -> None:
+@pytest.mark.parametrize("begins", ["in a window", "over screens", "before its picture"])
+def test_what_is_no_wish_leaves_the_scenes_width(begins: str) -> None:
     desk = Desk()
-    desk.resize(3840, filling=True)
-    desk.resize(1000)
-    assert desk.width == 0.7
-    assert desk.told == []
-
-
-def test_a_window_that_begins_over_screens_and_comes_back() -> None:
-    desk = Desk()
-    desk.screen = OwnScreen(desk.studio)
-    desk.resize(3840, filling=True)
-    desk.resize(1000)
-    assert (desk.width, desk.told) == (0.7, [])
-
-
-def test_before_the_first_picture_it_is_no_wish() -> None:
-    desk = Desk()
-    desk.screen = OwnScreen(desk.studio)
-    for width in (1280, 1920):
-        desk.screen.look(width, 9.0, filling=False, shown=False)
-    desk.resize(1920)
+    if begins != "in a window":
+        desk.screen = OwnScreen(desk.studio)
+    if begins == "before its picture":
+        for width in (1280, 1920):
+            desk.screen.look(width, 9.0, filling=False, shown=False)
+        desk.resize(1920)
+    else:
+        desk.resize(3840, filling=True)
+        desk.resize(1000)
     assert (desk.width, desk.told) == (0.7, [])
 
 

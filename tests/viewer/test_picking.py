@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from clfractal.device.select import Device
 from clfractal.engine.show import Look
 from clfractal.images.modes import eye_at
 from clfractal.scene.model import Scene
-from clfractal.scene.stereo import Stereo
+from clfractal.scene.stereo import Mode, Stereo
 from clfractal.viewer.aim import aimed
 from clfractal.viewer.display import Shown
 from clfractal.viewer.pacing import Pacing
@@ -22,22 +22,7 @@ from tests.render.shots import BALL_RADIUS
 from tests.viewer.sessions import BALL, scene_of, session_on, shown_frame, wait_for
 
 WINDOW = (128, 96)
-MODES = (
-    None,
-    "anaglyph",
-    "pair",
-    "multi_view",
-    "split",
-    "split_half",
-    "over_under",
-    "over_under_half",
-    "rows",
-    "columns",
-    "checkerboard",
-    "anaglyph_chessboard",
-    "left",
-    "right",
-)
+MODES = (None, *get_args(Mode))
 STEREO = "stereo={screen_width: 0.5, screen_distance: 0.7, mode: %s, swap: %s}"
 
 
@@ -127,17 +112,6 @@ def test_coarse_pictures_are_picked_too(device: Device) -> None:
         found = shown_pick(shown, 64.5, 48.5)
     assert found.point is not None
     assert np.linalg.norm(found.point) == pytest.approx(BALL_RADIUS, abs=0.03)
-
-
-@pytest.mark.parametrize("projection", ["perspective", "orthographic"])
-def test_both_projections(projection: str, device: Device) -> None:
-    camera = "camera={projection: orthographic, position: [0, -4, 0], height: 3}"
-    scene = in_window(None, *((camera,) if projection == "orthographic" else ()))
-    with session_on(device) as watch:
-        shown, _ = shown_frame(device, watch, watch.finished(scene), Look())
-    for x, y in ((64.5, 48.5), (50.5, 40.5), (70.5, 60.5)):
-        found = shown_pick(shown, x, y)
-        assert np.linalg.norm(found.point) == pytest.approx(BALL_RADIUS, abs=4e-3)
 
 
 def test_views_of_a_layout_are_told_apart(device: Device) -> None:

@@ -2,33 +2,21 @@
 
 from __future__ import annotations
 
+from typing import get_args
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from clfractal.images.modes import picture_size
 from clfractal.scene.model import Scene
-from clfractal.scene.stereo import APART, Stereo
+from clfractal.scene.stereo import APART, Mode, Stereo
 from clfractal.viewer.viewport import image_of, render_key
 from clfractal.viewer.window_places import places_of
 from tests.scenes import STEREO
 from tests.viewer.sessions import scene_of
 
-MODES = (
-    "pair",
-    "multi_view",
-    "split",
-    "split_half",
-    "over_under",
-    "over_under_half",
-    "rows",
-    "columns",
-    "checkerboard",
-    "anaglyph_chessboard",
-    "anaglyph",
-    "left",
-    "right",
-)
+MODES = get_args(Mode)
 SIDES = st.integers(2, 4000)
 
 

@@ -11,7 +11,6 @@ from hypothesis import strategies as st
 
 from clfractal.scene.load import load_scene
 from clfractal.scene.movement import movement_of
-from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.navigation import dolly
 from clfractal.viewer.playing import Player
 from clfractal.viewer.thinning import TOLERANCE, Sample, at_frames, flight
@@ -45,18 +44,6 @@ def test_playing_keeps_time_by_dropping_frames() -> None:
     assert not player.playing
     assert player.wait(101.3) is None
     assert frame(player) == 25
-
-
-def test_it_begins_again_or_ends() -> None:
-    player = player_of()
-    player.play(100.0)
-    player.step(100.0 + 41 / 20 + 0.11)
-    assert frame(player) == 2
-    player.repeat = False
-    player.step(100.0 + 99)
-    assert (frame(player), player.playing) == (40, False)
-    player.play(300.0)
-    assert frame(player) == 0
 
 
 def test_a_part_of_the_film_is_played() -> None:
@@ -242,10 +229,3 @@ def test_a_straight_flight_needs_two_keys() -> None:
     film = flight(load_scene(STILL).model_copy(update={"animation": {"frames": 10}}), samples, 0.0)
     assert [key.frame for key in film.tracks["camera.position"].keys or ()] == [0, 59]
     assert film.count == 60
-
-
-def test_samples_are_taken_at_whole_frames() -> None:
-    ends = [Sample(0.0, (0, 0, 0), (0, 1, 0), (0, 0, 1)), Sample(3.2, (3.2, 0, 0), (0, 1, 0), (0, 0, 1))]
-    assert [sample.position[0] for sample in at_frames(ends)] == pytest.approx([0, 1, 2, 3])
-    assert at_frames(ends[:1]) == ends[:1]
-    assert isinstance(load_scene(STILL).camera, PerspectiveCamera)

@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 
 pytest.importorskip("imgui_bundle")
 
-from imgui_bundle import imgui
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
@@ -23,7 +22,7 @@ from clfractal.files.png import read_png_pixels
 from clfractal.scene.load import load_scene
 from clfractal.viewer.background import Still
 from clfractal.viewer.editing import edited
-from clfractal.viewer.panels import order_form, right_dock, stills
+from clfractal.viewer.panels import order_form, stills
 from clfractal.viewer.panels.stills import (
     Wanted,
     check,
@@ -237,16 +236,6 @@ def test_every_state_is_told_and_drawn() -> None:
 @pytest.mark.parametrize(("seconds", "told"), [(0.1, "1 s"), (89, "89 s"), (91, "2 min"), (9000, "2.5 h")])
 def test_times_that_are_left(seconds: float, told: str) -> None:
     assert order_form.time_text(seconds) == told
-
-
-def test_numbers_are_typed_into_the_boxes(seen: Seen) -> None:
-    ui, stage = opened()
-    left, top, _, _ = right_dock.place(ui, "stills")
-    state: Wanted = ui.memory["stills"]
-    stage.double_click(left + 130, top + 80)
-    stage.type("640")
-    stage.press(imgui.Key.enter)
-    assert state.size == (640, 720)
 
 
 # A real one

@@ -234,16 +234,6 @@ def test_a_still_is_the_shells_picture(studio: Studio, tmp_path: Path) -> None:
         np.testing.assert_array_equal(found[name], right[name])
 
 
-def test_opening_a_scene_begins_anew(studio: Studio) -> None:
-    studio.edit({"camera.fov": 33})
-    studio.edit({"camera.fov": 999})
-    studio.open(scene_of(BALL))
-    assert not studio.problems
-    assert not studio.undo("camera")
-    assert not studio.unsaved
-    converged(studio)
-
-
 def test_stereo_that_is_fitted(studio: Studio) -> None:
     assert studio.edit({"stereo": scene_of(BULB, STEREO, "stereo.fit=auto").resolved()["stereo"]})
     converged(studio)
@@ -305,23 +295,5 @@ def test_a_frame_at_rest_has_the_films_blur_and_exposure(case: str, device: Devi
         wait_for(lambda: still.finished)
         film.save(tmp_path / "film.png")
         assert (read_picture(tmp_path / "still.png") == read_picture(tmp_path / "film.png")).all()
-    finally:
-        studio.close()
-
-
-def test_a_film_that_plays_keeps_its_exposure(device: Device) -> None:
-    scene = scene_of(FILM.replace("MORE", OTHERS["light and form move"]))
-    studio = Studio(scene, device, Pacing(), lambda: None)
-    try:
-        studio.resize(*VIEW)
-        found = []
-        for frame in (20, 0, 10):
-            studio.go_to_frame(frame)
-            rest(studio)
-            found.append(studio.exposure)
-        assert found == [found[0]] * 3
-        studio.go_to_frame(None)
-        rest(studio)
-        assert studio.exposure != found[0], "the scene as it stands has its own light"
     finally:
         studio.close()

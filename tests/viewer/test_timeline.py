@@ -78,16 +78,6 @@ def test_times_are_told_in_minutes_and_seconds(frame: float, fps: float, text: s
     assert t.clock(frame, fps) == text
 
 
-def test_neighbouring_keys_are_found_in_all_tracks() -> None:
-    both = film(10, 50).model_copy(
-        update={"tracks": {**film(10, 50).tracks, "x": Track(keys=(Key(time=1.2, value=0.0),))}}
-    )
-    assert t.frames_of_keys(both) == [10, 30, 50]
-    assert [t.key_after(both, frame) for frame in (0, 10, 10.5, 49, 50)] == [10, 30, 30, 50, None]
-    assert [t.key_before(both, frame) for frame in (10, 10.5, 30, 80)] == [None, 10, 10, 50]
-    assert t.frames_of_keys(both, ["x"]) == [30]
-
-
 # Keys
 
 
@@ -201,12 +191,6 @@ def test_stretching_keeps_the_order(given_: tuple[Animation, t.Selection], pivot
         or t.key_of(new, each).time
         for each in kept
     )
-
-
-def test_stretching_slows_down() -> None:
-    everything = t.keys_between(film(0, 10, 30), 0, 100, ["camera.fov"])
-    new, _ = t.stretched(film(0, 10, 30), everything, 10, 2)
-    assert times(new) == [0, 10, 50]
 
 
 @given(chosen(), st.sampled_from([None, *WAYS]))

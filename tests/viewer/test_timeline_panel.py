@@ -72,18 +72,6 @@ class Film:
         return self.ui.studio.frame_number
 
 
-def test_it_is_there_while_a_film_is_shown() -> None:
-    film = Film()
-    film.stage.move(900, 650)
-    assert imgui.get_io().want_capture_mouse
-    assert timeline_area.room_of(film.ui) > 0
-    film.ui.studio.go_to_frame(None)
-    film.stage.frame()
-    film.stage.move(901, 650)
-    assert not imgui.get_io().want_capture_mouse
-    assert timeline_area.room_of(film.ui) == 0
-
-
 def test_other_panels_make_room(monkeypatch: pytest.MonkeyPatch) -> None:
     film = Film()
     film.ui.show.add("history")
@@ -228,17 +216,6 @@ def place(film: Film, frame: float, value: float) -> tuple[float, float]:
     low, high = timeline_view.bounds_of(curve, values)
     top, bottom = film.ruler - 9 + panel._RULER + 4, film.ui.size[1] - theme.MARGIN - 7 - 6
     return film.x(frame), bottom - (value - low) / (high - low) * (bottom - top)
-
-
-def test_a_key_of_a_curve_is_dragged_in_time_and_value() -> None:
-    film = curved("camera.fov")
-    film.stage.drag(place(film, 10, 60), place(film, 20, 50))
-    assert list(film.keys()) == [0, 20]
-    assert film.keys()[20] == pytest.approx(50, abs=0.7)
-    assert film.ui.studio.history.depth("scene") == (1, 0)
-    # It does not pass its neighbour.
-    film.stage.drag(place(film, 20, film.keys()[20]), place(film, -1, film.keys()[20]))
-    assert list(film.keys()) == [0, 1]
 
 
 def test_several_keys_of_a_curve_are_dragged_together() -> None:

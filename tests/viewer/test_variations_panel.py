@@ -41,10 +41,10 @@ def opened(scene: Any = SCENE) -> tuple[Ui, Stage, list[Any]]:
     return ui, Stage(ui, variations.draw, window=False), tasks
 
 
-def settled(ui: Ui, stage: Stage) -> Choice:
+def settled(ui: Ui, stage: Stage) -> Any:
     """Draws until the thread is done."""
     stage.frame()
-    state: Choice = ui.memory["variations"]
+    state = ui.memory["variations"]
     if state.work is not None:
         state.work.join()
     stage.frame()
@@ -112,7 +112,6 @@ def test_a_click_is_one_step_that_keeps_what_is_no_part_of_it(seen: Seen) -> Non
     before, depth = ui.studio.scene, ui.studio.history.depth("scene")[0]
     seen.click(stage, "3")
     found = ui.studio.scene
-    assert state.work is not None
     variation = state.work.found[3][0].scene
     assert found.formula == variation.formula
     assert found.camera == variation.camera
@@ -142,30 +141,25 @@ def test_a_double_click_varies_a_variation_and_back_leads_to_the_first_set(seen:
     ui, stage, _ = opened()
     state = settled(ui, stage)
     original = ui.studio.scene
-    assert state.work is not None
     first = [each.changes for each, _ in state.work.found]
     seen.click(stage, "5", double=True)
     state = settled(ui, stage)
     assert state.base == ui.studio.scene != original
-    assert state.work is not None
     assert [each.changes for each, _ in state.work.found] != first
     assert ui.studio.history.depth("scene")[0] + ui.studio.history.depth("camera")[0] == 1
     seen.click(stage, "Back")
     state = settled(ui, stage)
     assert ui.studio.scene == original
-    assert state.work is not None
     assert [each.changes for each, _ in state.work.found] == first
 
 
 def test_new_ones_are_others_and_the_old_pictures_are_given_up(seen: Seen) -> None:
     ui, stage, tasks = opened()
     state = settled(ui, stage)
-    assert state.work is not None
     first, old = [each.changes for each, _ in state.work.found], list(tasks)
     assert len(old) == COUNT
     seen.click(stage, "New")
     state = settled(ui, stage)
-    assert state.work is not None
     assert [each.changes for each, _ in state.work.found] != first
     assert all(task.finished for task in old)
     assert sum(not task.finished for task in tasks) == COUNT
@@ -185,7 +179,6 @@ def test_the_scene_as_it_is_now_can_be_varied(seen: Seen) -> None:
     seen.click(stage, "Vary this")
     state = settled(ui, stage)
     assert state.base.formula.iterations == 7
-    assert state.work is not None
     assert all(each.scene.formula.iterations == 7 for each, _ in state.work.found)
 
 
@@ -197,21 +190,6 @@ def test_another_file_begins_anew() -> None:
     state = settled(ui, stage)
     assert state.base == other
     assert state.trail == []
-
-
-def test_opened_again_it_shows_the_same_set(seen: Seen) -> None:
-    ui, stage, _ = opened()
-    state = settled(ui, stage)
-    assert state.work is not None
-    first = [each.changes for each, _ in state.work.found]
-    seen.click(stage, "2")
-    ui.show.discard("variations")
-    stage.frame()
-    ui.show.add("variations")
-    state = settled(ui, stage)
-    assert state.work is not None
-    assert [each.changes for each, _ in state.work.found] == first
-    assert variations._number_of(ui, state) == 2
 
 
 def test_pictures_of_nothing_give_way_to_spares() -> None:

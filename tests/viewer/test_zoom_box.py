@@ -135,17 +135,6 @@ def test_keys_move_a_box_along_the_view_and_back(
     np.testing.assert_allclose(back.center, box.center, atol=1e-12)
 
 
-def test_a_box_is_placed_at_the_point_under_the_pointer_but_kept_inside() -> None:
-    stage = stage_of(START)
-    box = zoom_box.first_box(stage)
-    assert zoom_box.placed_at(box, stage, (1.0, 0.0, 0.1)).center == pytest.approx((1.0, 0.0, 0.1))
-    # A quarter of the box, so its middle stays 3/8 of the sides away from the middle.
-    assert zoom_box.placed_at(box, stage, (9, 9, 9)).center == pytest.approx(
-        (0.5 + 1.5, -0.2 + 1.125, 0.1 + 0.75)
-    )
-    assert zoom_box.placed_at(box, stage, (nan, inf, -inf)).center == stage.filled.center
-
-
 @given(st.data(), numbers(0.01, 100))
 def test_scaling_keeps_the_middle_where_there_is_room(data: st.DataObject, factor: float) -> None:
     stage = stage_of(START)
