@@ -53,6 +53,10 @@ def test_each_shape_is_a_file_with_all_functions() -> None:
     assert kinds("elements/shapes/emitters").keys() == {kind.tag for kind in solids()}
     check_functions("geometry/shapes.h", "elements/shapes", 5)
     check_functions("shading/emitter_places.h", "elements/shapes/emitters", 2)
+    for name in SHAPE_KINDS:
+        # How its span is found is said by a constant, so that a loop over objects has no others' code.
+        text = (folder("kernels") / f"elements/shapes/{name}.h").read_text("utf-8")
+        assert re.search(rf"^enum {{ {name}_turn = (EQUATION|SEARCH) }};$", text, re.MULTILINE), name
 
 
 def test_each_light_is_a_file_with_all_functions() -> None:

@@ -32,7 +32,7 @@ INLINE color emission_of(real value, world w) { return color_of(R(0.0), R(0.0), 
 // The part of a cloud's box on a ray before `far`; the result says where there is one.
 INLINE mask cloud_entered(int number, vec origin, vec direction, real far, world w, grid_ray *r) {
     __global const struct Object *o = w.objects + number;
-    const span box = object_span(o, 0, origin, direction);
+    const span box = grid_span(o, origin, direction);
     *r = grid_ray_of(o, w.tables, box, origin, direction, far);
     return less(box.entry, box.exit) & less(r->near, r->far);
 }

@@ -164,7 +164,7 @@ INLINE mask polynomial_root(const real *c, real length, mask inside, mask here, 
 // How far along a ray the surface of a volume is, or the largest number: where the value passes the level, or where the box cuts what is
 // above it.
 INLINE real level_met(object_record o, __global const float *tables, vec origin, vec direction, real far) {
-    const span box = object_span(o, 0, origin, direction);
+    const span box = grid_span(o, origin, direction);
     const grid_ray g = grid_ray_of(o, tables, box, origin, direction, far);
     const real voxel = (real)(o->voxel), level = (real)(o->level);
     mask active = less(box.entry, box.exit) & less(g.near, g.far);

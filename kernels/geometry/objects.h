@@ -3,18 +3,17 @@
 #include "geometry/object_grids.h"
 #include "geometry/water.h"
 
-// In which turn an object is met: those whose boundary an equation tells at once; waves and values on grids, which are searched only
-// before all else; and what is not met here.
 INLINE int turn_to_meet(object_record o) {
-    return o->kind == OBJECT_WATER ? 1 : o->kind == OBJECT_VOLUME ? 2 : o->kind == OBJECT_JOINED || o->kind == OBJECT_CLOUD ? 3 : 0;
+    return o->kind == OBJECT_WATER ? WATER : o->kind == OBJECT_VOLUME ? GRID : shape_turn(o->kind);
 }
 
-// Where a ray meets the object with index `i`, of which planes may leave a part only. `face`: the plane whose cut it meets there, or -1.
-INLINE real object_met(int i, vec origin, vec direction, object_record objects, plane_set planes, real *face) {
+// Where a ray meets the object with index `i`, if it is of this turn; planes may leave a part of it only. `face`: the plane whose cut it
+// meets there, or -1.
+INLINE real object_met(int i, int turn, vec origin, vec direction, object_record objects, plane_set planes, real *face) {
     real nearest = (real)(REAL_LARGEST);
     *face = R(-1.0);
     for (int number = 0; number < objects[i].spans; ++number) {
-        span s = object_span(objects + i, number, origin, direction);
+        span s = object_span(objects + i, turn, number, origin, direction);
         real begins = R(-1.0), ends = R(-1.0);
         for (int plane = 0; plane < planes.count; ++plane) {
             if (!plane_cuts(planes.planes + plane, i)) continue;
@@ -42,17 +41,21 @@ CALLED real objects_met(const ray *r, object_record objects, plane_set planes, i
     real nearest = (real)(REAL_LARGEST), face;
     *number = R(0.0);
     for (int i = 0; i < count; ++i) {
-        if (turn_to_meet(objects + i) != 0) continue;
-        nearer_met(object_met(i, r->origin, r->direction, objects, planes, &face), i, r, &nearest, number);
+        if (turn_to_meet(objects + i) != EQUATION) continue;
+        nearer_met(object_met(i, EQUATION, r->origin, r->direction, objects, planes, &face), i, r, &nearest, number);
     }
     for (int i = 0; i < count; ++i) {
-        if (turn_to_meet(objects + i) != 1) continue;
+        if (turn_to_meet(objects + i) != SEARCH) continue;
+        nearer_met(object_met(i, SEARCH, r->origin, r->direction, objects, planes, &face), i, r, &nearest, number);
+    }
+    for (int i = 0; i < count; ++i) {
+        if (turn_to_meet(objects + i) != WATER) continue;
         const vec from = object_own(objects + i, vec_sub(r->origin, vec_splat(objects[i].middle)));
         const vec way = object_own(objects + i, r->direction);
         nearer_met(water_met(objects + i, from, way, fmin(nearest, r->far), r->footprint, r->spread), i, r, &nearest, number);
     }
     for (int i = 0; i < count; ++i) {
-        if (turn_to_meet(objects + i) != 2) continue;
+        if (turn_to_meet(objects + i) != GRID) continue;
         nearer_met(level_met(objects + i, tables, r->origin, r->direction, fmin(nearest, r->far)), i, r, &nearest, number);
     }
     return nearest;
@@ -99,11 +102,12 @@ INLINE mask object_holds(object_record o, vec point) {
 INLINE real objects_faced(vec origin, vec direction, real number, object_record objects, plane_set planes, int count,
                           vec *normal, vec point, vec *place) {
     real thing = number;
+    if (planes.count == 0) return thing;   // (nothing is met once more)
     for (int i = 0; i < count; ++i) {
         const mask here = equal(number, (real)((scalar)(i + 1)));
         if (!any_lane(here)) continue;
         real face;
-        object_met(i, origin, direction, objects, planes, &face);
+        object_met(i, ANY_TURN, origin, direction, objects, planes, &face);
         for (int plane = 0; plane < planes.count; ++plane) {
             const mask faced = here & equal(face, (real)((scalar)plane));
             const vec front = vec_splat(planes.planes[plane].normal);

@@ -6,15 +6,27 @@
 //   mask NAME_holds(vec form, vec own)                           whether a place is inside
 //   real NAME_far(vec form, vec own, vec sides, vec *n)          how far the surface is in scene units, below 0 inside, and the direction
 //                                                                away from it, by components as the normal's
+//   enum { NAME_turn = EQUATION }                                and how its span is found: by an EQUATION that is solved at once, or by a
+//                                                                SEARCH in steps, whose registers other shapes do not pay for
 // A solid also has a file of `elements/shapes/emitters`, with the functions of `emitter_places.h`.
 
 #include "geometry/spans.h"
+
+// In which turn of `objects_met` an object is met: by the equation of its boundary, by a search of its own, among waves and among values on
+// grids, which are searched only before all else; or not there. Where a turn is ANY_TURN, that is not asked.
+enum { EQUATION, SEARCH, WATER, GRID, NOT_MET, ANY_TURN };
+
 #include "elements/shapes"
 
 // By the kind of a record. Of other kinds there is no span, and a place is what it is.
-#define SPAN_OF(KIND, name) case SHAPE_##KIND: return name##_span(form, number, from, way);
-INLINE span shape_span(int kind, vec form, int number, vec from, vec way) {
-    switch (kind) { SHAPES(SPAN_OF) default: return (span){R(1.0), R(-1.0)}; }
+#define TURN_OF(KIND, name) case SHAPE_##KIND: return name##_turn;
+INLINE int shape_turn(int kind) { switch (kind) { SHAPES(TURN_OF) default: return NOT_MET; } }
+// (Where `turn` is a constant, only the shapes of that turn are compiled.)
+#define SPAN_OF(KIND, name) \
+    case SHAPE_##KIND: if (turn == name##_turn || turn == ANY_TURN) return name##_span(form, number, from, way); break;
+INLINE span shape_span(int kind, int turn, vec form, int number, vec from, vec way) {
+    switch (kind) { SHAPES(SPAN_OF) }
+    return (span){R(1.0), R(-1.0)};
 }
 #define NORMAL_OF(KIND, name) case SHAPE_##KIND: return name##_normal(form, own);
 INLINE vec shape_normal(int kind, vec form, vec own) { switch (kind) { SHAPES(NORMAL_OF) default: return vec_of(R(0.0), R(0.0), R(1.0)); } }

@@ -1,4 +1,5 @@
 // The cube between -1 and 1.
+enum { box_turn = EQUATION };
 INLINE span box_span(vec form, int number, vec from, vec way) {
     return span_of_both(span_of_both(span_of_slab(from.x, way.x), span_of_slab(from.y, way.y)), span_of_slab(from.z, way.z));
 }

@@ -1,4 +1,5 @@
 // The cylinder of radius 1 between z = -1 and 1. With unequal sides its distances are too small, but not their directions.
+enum { cylinder_turn = EQUATION };
 INLINE span cylinder_span(vec form, int number, vec from, vec way) {
     // A way along the axis is in the tube everywhere, or nowhere.
     const real across = way.x * way.x + way.y * way.y, distance = from.x * from.x + from.y * from.y;

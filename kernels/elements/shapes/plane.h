@@ -1,4 +1,5 @@
 // All below a plane.
+enum { plane_turn = EQUATION };
 INLINE span plane_span(vec form, int number, vec from, vec way) {
     const real t = -from.z / divisor(way.z), all = (real)(REAL_LARGEST);
     const mask down = less(way.z, R(0.0));

@@ -1,4 +1,5 @@
 // The ball of radius 1. With unequal sides its distances are too small, but not their directions.
+enum { sphere_turn = EQUATION };
 INLINE span sphere_span(vec form, int number, vec from, vec way) { return span_of_ball(from, way); }
 
 INLINE vec sphere_normal(vec form, vec own) { return own; }

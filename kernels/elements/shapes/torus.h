@@ -37,6 +37,8 @@ INLINE real torus_crossing(vec form, vec from, vec way, real out, real in) {
     return t;
 }
 
+enum { torus_turn = SEARCH };
+
 // Along a ray, from its nearest place to the middle on, the equation of the torus is t^4 + 2 p t^2 + 4 q t + r = 0. Its minima, one or
 // two, are roots of t^3 + p t + q; where the place between two of them is outside, so are two parts of the ray inside.
 INLINE span torus_span(vec form, int number, vec from, vec way) {
