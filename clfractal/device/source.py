@@ -182,23 +182,23 @@ _found_once = lru_cache(maxsize=None)(_found)
 def kinds(family: str, kernels: Path | None = None) -> dict[str, int]:
     """The kinds that a folder of kernels has files of, such as `elements/shapes`, each with its number from 1.
 
-    In C they are `SHAPE_BOX` and so on, and `SHAPES(DO)` is `DO(BOX, box) ...`. A folder in such a folder has more of
-    some of its kinds, under the same numbers.
+    In C they are `SHAPE_BOX` and so on, and `SHAPES(DO)` is `DO(BOX, box) ...` of those whose files are there. A folder
+    in such a folder has more of some kinds, or all that there is of them, under the same numbers.
     """
-    files = sorted(((kernels or folder("kernels")) / family).glob("*.h"))
-    return {path.stem: number for number, path in enumerate(files, 1)}
+    names = {path.stem for path in ((kernels or folder("kernels")) / family).rglob("*.h")}
+    return {name: number for number, name in enumerate(sorted(names), 1)}
 
 
 def _family(kernels: Path, name: str) -> str:
     """The text that stands for a folder; "" if there is none."""
     several = name.rpartition("/")[2].upper()
-    found = kinds(name, kernels)
-    lines = [f'#include "{name}/{kind}.h"' for kind in found]
+    own = sorted(path.stem for path in (kernels / name).glob("*.h"))
+    lines = [f'#include "{name}/{kind}.h"' for kind in own]
     if name.count("/") == 1:
         one = several.removesuffix("S")
-        lines += [f"#define {one}_{kind.upper()} {number}" for kind, number in found.items()]
-    entries = " ".join(f"DO({kind.upper()}, {kind})" for kind in found)
-    return "\n".join([*lines, f"#define {several}(DO) {entries}"]) if found else ""
+        lines += [f"#define {one}_{kind.upper()} {number}" for kind, number in kinds(name, kernels).items()]
+    entries = " ".join(f"DO({kind.upper()}, {kind})" for kind in own)
+    return "\n".join([*lines, f"#define {several}(DO) {entries}"]) if lines else ""
 
 
 _family_once = lru_cache(maxsize=None)(_family)

@@ -22,7 +22,7 @@ from clfractal.schema.base import (
     unit,
 )
 from clfractal.schema.fields import SCALE, Usual
-from clfractal.schema.kinds import in_order, members, one_of
+from clfractal.schema.kinds import Element, in_order, members, one_of
 from clfractal.schema.names import ObjectName
 from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, turned_axes
 
@@ -167,7 +167,8 @@ class VolumeObject(ObjectBase):
         return self
 
 
-KINDS = in_order((*members("shapes"), WaterObject, FormulaObject, VolumeObject))
+_KINDS: list[type[Element]] = [*members("shapes"), WaterObject, FormulaObject, VolumeObject]
+KINDS = in_order(_KINDS)
 if TYPE_CHECKING:
     SceneObject: TypeAlias = ObjectBase
 else:

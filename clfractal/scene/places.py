@@ -14,7 +14,6 @@ from clfractal.errors import SceneError, Where
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.language import Chain
 from clfractal.scene.model import Scene
-from clfractal.schema.base import unit
 from clfractal.schema.trap import Trap
 
 Floats = NDArray[np.float64]
@@ -198,7 +197,7 @@ def trap_distances(chain: Chain, points: Floats, iterations: int, trap: Trap) ->
         place = [np.array(np.broadcast_to(part, result.shape), float) for part in raw]
         state = [np.zeros_like(part) if chain.add == "point" else part.copy() for part in place]
         alive = np.arange(len(points))
-        first = distance_from_trap(trap, np.stack(place[:3], axis=1))
+        first = trap.away(np.stack(place[:3], axis=1))
         for application in range(iterations):
             inside = np.sqrt(sum(part * part for part in state)) <= chain.bailout
             alive, state = alive[inside], [part[inside] for part in state]
@@ -208,19 +207,8 @@ def trap_distances(chain: Chain, points: Floats, iterations: int, trap: Trap) ->
             constant = reference.constant_of(bound, [part[alive] for part in place])
             moved = reference.apply(bound, state, constant, backend)
             state = [np.array(np.broadcast_to(part, alive.shape), float) for part in moved]
-            result[alive] = np.fmin(result[alive], distance_from_trap(trap, np.stack(state[:3], axis=1)))
+            result[alive] = np.fmin(result[alive], trap.away(np.stack(state[:3], axis=1)))
     return np.where(np.isfinite(result), result, first)
-
-
-def distance_from_trap(trap: Trap, points: Floats) -> Floats:
-    """From points in z, shape (n, 3), to the trap."""
-    offset, axis = points - np.array(trap.center), np.array(unit(trap.direction))
-    along = offset @ axis
-    if trap.shape == "plane":
-        return np.asarray(np.abs(along))
-    arm = offset - along[:, None] * axis if trap.shape == "axis" else offset
-    radius = trap.radius if trap.shape == "sphere" else 0.0
-    return np.asarray(np.abs(np.linalg.norm(arm, axis=1) - radius))
 
 
 def spread_out(points: Floats, count: int, spacing: float) -> NDArray[np.int64]:

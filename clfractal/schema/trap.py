@@ -1,16 +1,40 @@
 """Orbit traps, of colours, glow and lights."""
 
-from typing import Literal, Self
+from abc import abstractmethod
+from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.schema.base import Direction, Length, Position, Section, length, problem
+from clfractal.schema.base import Direction, Length, Position, Section, length, problem, unit
+from clfractal.schema.kinds import Kind, OneOf, by_word
+
+
+class TrapShape(Kind):
+    """A shape to which orbits come near, by the file of its name in `kernels/elements/traps`, too.
+
+    Attributes:
+        keys: those of a trap that count for it.
+    """
+
+    keys: ClassVar[tuple[str, ...]] = ()
+
+    @staticmethod
+    @abstractmethod
+    def away(offsets: Any, along: Any, axis: Any, radius: float) -> Any:
+        """How far places of z are from it.
+
+        Args:
+            offsets: from the trap's centre to the places, shape (n, 3), in NumPy.
+            along: their parts along its direction.
+            axis: this direction, length 1.
+            radius: the trap's.
+        """
 
 
 class Trap(Section):
     """A shape in the formula's space; the colour follows the smallest distance of the orbit from it."""
 
-    shape: Literal["point", "axis", "plane", "sphere"] = Field(
+    shape: Annotated[str, OneOf("traps")] = Field(
         "point", description="the shape to which the orbit's distance is measured"
     )
     center: Position = Field(
@@ -24,3 +48,15 @@ class Trap(Section):
         if length(self.direction) < 1e-12:
             raise problem("must not be zero", "direction")
         return self
+
+    @property
+    def used_keys(self) -> tuple[str, ...]:
+        """The keys that count for its shape."""
+        shape: type[TrapShape] = by_word("traps")[self.shape]
+        return ("shape", *shape.keys)
+
+    def away(self, points: Any) -> Any:
+        """From points in z, an array of shape (n, 3), to the trap."""
+        offsets, axis = points - self.center, unit(self.direction)
+        shape: type[TrapShape] = by_word("traps")[self.shape]
+        return shape.away(offsets, offsets @ axis, axis, self.radius)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-TRAPS = {"point": 0, "axis": 1, "plane": 2, "sphere": 3}
+from clfractal.device.source import kinds
+
+TRAPS = kinds("elements/traps")
 # In the order of when they are known: with the hit, with all of a pixel's points, by asking the formula.
 COLORINGS = {
     "solid": 0,
@@ -37,7 +39,6 @@ FEATURES = {
 }
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
-    "TRAP": TRAPS,
     "COLORING": COLORINGS,
     "ALONG": ALONG,
     "NORMAL": NORMALS,
@@ -46,7 +47,7 @@ _FAMILIES: Mapping[str, Mapping[str, int]] = {
 
 
 def kind_text() -> str:
-    """The numbers as constants in C, such as `TRAP_AXIS`."""
+    """The numbers as constants in C, such as `ALONG_VIEW`."""
     return "".join(
         f"#define {family}_{word.upper()} {number}\n"
         for family, numbers in _FAMILIES.items()

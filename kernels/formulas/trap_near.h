@@ -1,17 +1,18 @@
-// How near the orbit of a point comes to a trap: a point, an axis or plane through it, or the sphere around it.
+// How near the orbit of a point comes to a trap. Its shape is a file of `elements/traps` with this function:
+//   real NAME_away(vec offset, vec direction, real radius)     how far the place is whose offset from the centre this is
 typedef struct {
     int shape;
     vec center, direction;
     real radius;
 } trap;
 
+#include "elements/traps"
+
 // From the first three variables of z to the trap.
+#define AWAY(KIND, name) case TRAP_##KIND: return name##_away(offset, near.direction, near.radius);
 INLINE real trap_distance(trap near, state z) {
     const vec offset = vec_sub(vec_of(z.s0, z.s1, z.s2), near.center);
-    const real along = vec_dot(offset, near.direction);
-    if (near.shape == TRAP_PLANE) return fabs(along);
-    const vec arm = near.shape == TRAP_AXIS ? vec_along(offset, -along, near.direction) : offset;
-    return fabs(sqrt(vec_dot(arm, arm)) - (near.shape == TRAP_SPHERE ? near.radius : R(0.0)));
+    switch (near.shape) { TRAPS(AWAY) default: return (real)(REAL_LARGEST); }
 }
 
 // How near z comes to a trap after one application or more, the one that leaves the bailout included. An orbit that is

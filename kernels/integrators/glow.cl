@@ -28,7 +28,7 @@ INLINE real glow_along(ray r, mask active, bits seed, counters *cost, world w, o
         const vec point = vec_along(r.origin, place, r.direction);
         const clearance here = orbit_distance(point, active, orbit, k);
         real bright = exp(-fmin(here.step / width, R(80.0)));
-        if (m->glow_trap >= 0) {
+        if (m->glow_trap != 0) {
             const trap near = {m->glow_trap, vec_splat(m->glow_center), vec_splat(m->glow_direction), (real)(m->glow_radius)};
             bright *= exp(-fmin(orbit_near(near, point, active, orbit, k) / (real)(m->glow_reach), R(80.0)));
         }

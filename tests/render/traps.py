@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from clfractal.formulas import reference
 from clfractal.scene.model import Scene
+from clfractal.shading.kind_numbers import TRAPS
 from tests.render.shots import PERSPECTIVE
 from tests.scenes import scene_of
 
@@ -32,7 +33,13 @@ def trap_distances(z: npt.ArrayLike) -> list[float]:
     """From a point in z to the shapes of TRAP, in the order of TRAPS."""
     offset, axis = np.asarray(z) - TRAP["center"], np.array(TRAP["direction"]) / 3
     reach, along = float(np.linalg.norm(offset)), float(offset @ axis)
-    return [reach, float(np.linalg.norm(np.cross(offset, axis))), abs(along), abs(reach - TRAP["radius"])]
+    found = {
+        "point": reach,
+        "axis": float(np.linalg.norm(np.cross(offset, axis))),
+        "plane": abs(along),
+        "sphere": abs(reach - TRAP["radius"]),
+    }
+    return [found[shape] for shape in TRAPS]
 
 
 def trap_by_numpy(scene: Scene, points: Floats) -> Floats:

@@ -52,10 +52,6 @@ def draw(ui: Ui) -> None:
 
 def _trap(ui: Ui) -> None:
     w.group(ui, "Trap")
-    w.field(ui, "coloring.trap.shape")
-    w.field(ui, "coloring.trap.center", step=0.01)
-    shape = ui.studio.scene.coloring.trap.shape
-    if shape in ("axis", "plane"):
-        w.field(ui, "coloring.trap.direction", step=0.01)
-    if shape == "sphere":
-        w.field(ui, "coloring.trap.radius")
+    fine = {"step": 0.01}
+    used = ui.studio.scene.coloring.trap.used_keys
+    w.fields(ui, "coloring.trap", used, center=fine, direction=fine)

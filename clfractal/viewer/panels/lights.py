@@ -134,10 +134,7 @@ def _light(ui: Ui, index: int) -> None:
             continue
         value = getattr(light, name)
         if isinstance(value, Trap):
-            keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
-                value.shape, ("center", "direction")
-            )
-            w.fields(ui, f"{path}.{name}", ("shape", *keys))
+            w.fields(ui, f"{path}.{name}", value.used_keys)
         else:
             w.field(ui, f"{path}.{name}", **options.get(name, {}))
     w.field(ui, f"{path}.shadow")

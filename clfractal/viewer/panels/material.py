@@ -95,10 +95,7 @@ def _glow(ui: Ui, radius: float) -> None:
     if glow is None or glow.by != "trap":
         return
     w.field(ui, "glow.reach")
-    keys = {"point": ("center",), "sphere": ("center", "radius")}.get(
-        glow.trap.shape, ("center", "direction")
-    )
-    w.fields(ui, "glow.trap", ("shape", *keys))
+    w.fields(ui, "glow.trap", glow.trap.used_keys)
 
 
 def draw_surroundings(ui: Ui) -> None:

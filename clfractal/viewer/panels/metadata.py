@@ -14,6 +14,7 @@ from pydantic_core import PydanticUndefined
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 from clfractal.schema.fields import Usual, known
+from clfractal.schema.kinds import OneOf
 from clfractal.schema.mapped import Map
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
@@ -153,6 +154,8 @@ def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:
         bounds = {**inner, **bounds}
     else:
         kind, size, choices = "other", 0, ()
+    if kind == "text" and (words := known(section, name, OneOf)) is not None:
+        kind, choices = "choice", words.words
     sections = tuple(each for each in options if isinstance(each, type) and issubclass(each, Section))
     if sections and len(sections) == len(options):
         kind = "section"

@@ -1,0 +1,1 @@
+"""Shapes of orbit traps, which `kernels/elements/traps` knows by the same names."""
