@@ -1,4 +1,4 @@
-"""Makes the tables of keys in docs/*.md of what the schema declares, and the sections of shapes, lights, materials.
+"""Makes the tables of keys in docs/*.md of what the schema declares, sections of kinds, and quantities of colours.
 
 python docs/make_reference.py
 
@@ -20,6 +20,7 @@ from clfractal.scene.load import schema
 from clfractal.scene.materials import PARTS
 from clfractal.schema.hex_color import COLOR_SCHEMA, TEXT_SCHEMA
 from clfractal.schema.kinds import members
+from clfractal.schema.quantity import colorings
 from clfractal.schema.shape import solids
 
 DOCS = Path(__file__).resolve().parent
@@ -27,6 +28,7 @@ HEAD = "| key | default | allowed | meaning |\n|---|---|---|---|\n"
 _TABLE = re.compile(r"^<!-- keys of (\w+) -->\n\n(?:\|.*\n)*", re.MULTILINE)
 _KINDS = re.compile(r"(?<=<!-- )(solids|lights)( -->\n).*(?=<!-- end of \1 -->)", re.DOTALL)
 _PARTS = re.compile(r"(?<=<!-- parts -->\n).*(?=<!-- end of parts -->)", re.DOTALL)
+_QUANTITIES = re.compile(r"(?<=<!-- quantities -->\n\n)(?:\|.*\n)*")
 # Words of descriptions as pages write them.
 _LINKS = {
     "`materials`": "[`materials`](paths.md#materials)",
@@ -39,6 +41,7 @@ def made(page: str) -> str:
     """A page's text with the tables and sections that the schema says."""
     found = _TABLE.sub(lambda table: _table(table[1], table[0]), page)
     found = _PARTS.sub(lambda parts: "\n" + "".join(_part_sections(parts[0])), found)
+    found = _QUANTITIES.sub(lambda _: _quantities(), found)
     return _KINDS.sub(lambda block: f"{block[1]}{block[2]}\n" + "".join(_sections(block[1], block[0])), found)
 
 
@@ -74,6 +77,16 @@ def _rows(name: str) -> Iterator[tuple[str, str, str, str]]:
         for word, link in _LINKS.items():
             meaning = meaning.replace(word, link)
         yield f"`{key}`", _default(entry, key, found.get("required", [])), _allowed(entry), meaning
+
+
+def _quantities() -> str:
+    """The table of quantities that choose colours."""
+    rows = (
+        f"| `{kind.tag}` | {kind.__doc__} | {kind.unit} | {kind.usual_scale} |\n"
+        for kind in colorings()
+        if kind.uses_palette
+    )
+    return "| `by` | q | unit | typical `scale` |\n|---|---|---|---|\n" + "".join(rows)
 
 
 def _sections(family: str, before: str) -> Iterator[str]:

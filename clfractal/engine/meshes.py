@@ -19,7 +19,7 @@ from clfractal.files import memory
 from clfractal.files.document import write_document
 from clfractal.files.mesh import Mesh
 from clfractal.files.volume_file import SCENE_KEY, Volume
-from clfractal.integrators.vertices import COLORED_BY, dress, on_faces
+from clfractal.integrators.vertices import dress, on_faces
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.grid_values import finite_range, in_words
 from clfractal.scene.load import load_coloring, load_scene, read_scene
@@ -237,7 +237,7 @@ def _dressed(mesh: Mesh, made: Made, volume: Volume, talk: Talk) -> Mesh:
     """The mesh with the formula's normals and the scene's colours, and the scene as its text."""
     job, by = made.job, made.coloring.by
     plan = job.views[0].plan
-    if by not in COLORED_BY:
+    if made.coloring.kind.known != "at_hit":
         talk.say(f"coloring.by: {by} cannot be computed for vertices; they get the material's colour")
     spacing = np.diag(volume.directions)
     z, y, x = volume.values.shape

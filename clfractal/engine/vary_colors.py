@@ -112,7 +112,7 @@ class _Look:
         renderer = part.renderer
         transfer = renderer.transfer if isinstance(renderer, VolumeRenderer) else None
         shows_material = transfer is None or transfer.color is None
-        if material is not None and shows_material and (coloring is None or coloring.by == "solid"):
+        if material is not None and shows_material and (coloring is None or coloring.kind.of_material):
             yield "material.color", self.grade.color(material.color, largest=1.0)
         if coloring is not None and coloring.uses_palette:
             yield from self._palette("coloring", coloring)

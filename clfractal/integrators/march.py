@@ -160,7 +160,9 @@ def searches_far(scene: Scene) -> bool:
 def uses_positions(scene: Scene) -> bool:
     """Whether normals or colours are made from the places of a pixel's points."""
     renderer = scene.surface
-    return renderer.used_points.count > 1 and (renderer.normal_of_points or scene.coloring.by == "residual")
+    return renderer.used_points.count > 1 and (
+        renderer.normal_of_points or scene.coloring.kind.known == "with_points"
+    )
 
 
 def march_record(

@@ -146,7 +146,7 @@ def finest_steps(scene: Scene, view: View) -> float:
         return footprint / (max(farthest, radius) * float(np.finfo(np.float32).eps))
     # The points of a pixel lie closer, and normals that are made from their places need them exact.
     footprint /= math.sqrt(renderer.used_points.count)
-    if renderer.normal_of_points or scene.coloring.by == "residual":
+    if renderer.normal_of_points or scene.coloring.kind.known == "with_points":
         footprint /= PLACES_PER_POINT
     finer = max(scene.image.height / scene.image.reference, 1.0)
     return Fineness.of(scene).detail * finer * footprint / unit

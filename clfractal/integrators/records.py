@@ -20,9 +20,9 @@ from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient, Image
 from clfractal.schema.base import unit
-from clfractal.schema.mapped import QUANTITIES, Map
+from clfractal.schema.mapped import Map
 from clfractal.shading.environment import PackedEnvironment, material_fields
-from clfractal.shading.kind_numbers import ALONG, COLORINGS, TRAPS
+from clfractal.shading.kind_numbers import ALONG, COLORINGS, KNOWN, TRAPS
 from clfractal.shading.maps import asked_maps
 
 VIEW = Struct(
@@ -64,7 +64,10 @@ MATERIAL = Struct(
         Field("palette_scale", "real", 0, "palettes per unit of the quantity that chooses the colour"),
         Field("palette_offset", "real", 0, "start in the palette"),
         Field("palette_repeat", "int", 0, "1: the palette begins again after its end; 0: its ends go on"),
-        Field("coloring", "int", 0, "what chooses the colour, COLORING_"),
+        Field("coloring", "int", 0, "what chooses the colour, or is asked for a map, COLORING_"),
+        Field("known", "int", 0, "when that is known, KNOWN_"),
+        Field("of_objects", "int", 0, "1: the formula has an answer on objects, too"),
+        Field("of_volumes", "int", 0, "1: it colours volumes"),
         Field("along", "int", 0, "the way of thickness or layer distance, ALONG_"),
         Field("coloring_step", "real", 0, "step along the way of thickness or layer distance, scene units"),
         Field("coloring_limit", "real", 0, "longest way, scene units"),
@@ -73,9 +76,6 @@ MATERIAL = Struct(
         Field("trap_center", "real", 3, "a point of the trap, in z"),
         Field("trap_direction", "real", 3, "its axis' or normal's direction, length 1"),
         Field("trap_radius", "real", 0, "a sphere's radius, in z"),
-        Field(
-            "asks", "int", 0, "of a record behind the scene's own: what a material's map asks the formula for"
-        ),
         Field("trap_shape", "int", 0, "of the trap, TRAP_"),
         Field("reflection", "real", 0, "part that is mirrored sharply"),
         Field("fog_color", "real", 3, "linear Rec. 709"),
@@ -243,9 +243,14 @@ def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
     """The fields of a Material for `kernels/shading/coloring.h`."""
     radius = scene.bounds[1]
     step = coloring.step if coloring.step is not None else radius / 100
+    kind = coloring.kind
+    assert kind is not None
     direction = np.array(coloring.trap.direction, float)
     return {
-        "coloring": COLORINGS.get(coloring.by or "", 0),
+        "coloring": COLORINGS[kind.tag],
+        "known": KNOWN[kind.known],
+        "of_objects": int(kind.of_objects),
+        "of_volumes": int(kind.of_volumes),
         "along": ALONG[coloring.along] if isinstance(coloring, Coloring) else ALONG["normal"],
         "coloring_step": step,
         "coloring_limit": 2 * radius,
@@ -254,6 +259,5 @@ def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
         "trap_center": coloring.trap.center,
         "trap_direction": direction / np.linalg.norm(direction),
         "trap_radius": coloring.trap.radius,
-        "asks": QUANTITIES.index(coloring.by) if isinstance(coloring, Map) and coloring.by is not None else 0,
         "trap_shape": TRAPS[coloring.trap.shape],
     }

@@ -73,7 +73,7 @@ def _goes_on(scene: Scene) -> bool:
 
 def _tells_things(scene: Scene, plan: Plan) -> bool:
     """Whether interactions know more than how they look."""
-    by_quantity = scene.coloring.by not in ("solid", "normal", "iterations")
+    by_quantity = scene.coloring.kind.known != "at_hit"
     return by_quantity or bool(scene.objects) or has_cryptomatte(plan) or has_faces(scene)
 
 

@@ -30,8 +30,6 @@ WALL_PUSH = 0.5
 # Least cosine between the formula's normal and the grid's: what is further apart belongs to detail finer than the grid,
 # and would be seen as dark speckles on a surface that does not have it.
 LEAST_COSINE = 0.5
-COLORED_BY = ("solid", "normal", "iterations")
-"""Ways of coloring that vertices can have; the others need a ray, or are too costly here."""
 
 
 def dress(
@@ -49,7 +47,8 @@ def dress(
     """The mesh with normals from the formula's Jacobian, and colours; objects have those of their own.
 
     A normal stays unchanged if the formula has none nearby, or a very different one: there the detail is finer than
-    the grid. If `coloring.by` is not in COLORED_BY, colours are the material's.
+    the grid. What chooses colours must be known with a hit (the others
+    need a ray, or are too costly here): else colours are the material's.
 
     Args:
         coloring: used instead of the scene's coloring.
@@ -112,11 +111,12 @@ def _colors(
     scene: Scene, coloring: Coloring, normals: npt.NDArray[np.float32], smooth: npt.NDArray[np.float32]
 ) -> npt.NDArray[np.float32]:
     """Linear colours, (n, 3), as rays find them (kernels/shading/color.h)."""
-    if coloring.by == "normal":
-        return np.float32(0.5) + np.float32(0.5) * normals
-    if coloring.by == "iterations":
+    plain = np.broadcast_to(np.array(scene.material.color, np.float32), normals.shape)
+    if coloring.kind.known != "at_hit":
+        return plain
+    if coloring.uses_palette:
         return _from_palette(coloring, smooth)
-    return np.broadcast_to(np.array(scene.material.color, np.float32), normals.shape)
+    return np.asarray(coloring.kind.own_colors(normals, plain), np.float32)
 
 
 def _from_palette(coloring: Coloring, quantity: npt.NDArray[np.float32]) -> npt.NDArray[np.float32]:

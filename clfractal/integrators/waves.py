@@ -66,9 +66,7 @@ def rays_group(lanes: int) -> tuple[int, ...]:
 
 def asks_formula(scene: Scene) -> bool:
     """Whether a quantity that chooses colours, or a material's, is found by asking the formula."""
-    return scene.coloring.by in ("thickness", "layer_distance", "trap") or bool(
-        asked_maps(scene) or bump_numbers(scene)
-    )
+    return scene.coloring.kind.known == "by_formula" or bool(asked_maps(scene) or bump_numbers(scene))
 
 
 def has_cones(scene: Scene, plan: Plan) -> bool:

@@ -23,6 +23,7 @@ from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 from clfractal.schema.base import Vector
+from clfractal.schema.quantity import colorings
 from clfractal.schema.shape import Simple
 
 if TYPE_CHECKING:
@@ -120,9 +121,10 @@ def _check_volume(scene: Scene) -> None:
             )
         if renderer.file is None:
             renderer.check_level(*renderer.value_range(scene.formula.iterations))
-    if scene.coloring.by not in ("solid", "normal"):
+    if scene.coloring.uses_palette:
+        plain = " or ".join(kind.tag for kind in colorings() if not kind.uses_palette)
         raise SceneError(
-            f"must be solid or normal for a volume, got {scene.coloring.by}; renderer.transfer.color colours values",
+            f"must be {plain} for a volume, got {scene.coloring.by}; renderer.transfer.color colours values",
             Where(path="coloring.by"),
         )
 
@@ -236,9 +238,10 @@ def _check_planes(scene: Scene) -> None:
 def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
     """Residuals need four points: a plane fits three points exactly."""
     count = renderer.used_points.count
-    if scene.coloring.by == "residual" and count < 4:
+    kind = scene.coloring.kind
+    if count < kind.least_points:
         raise SceneError(
-            f"residual needs at least 4 points per pixel (renderer.points), got {count}",
+            f"{kind.tag} needs at least {kind.least_points} points per pixel (renderer.points), got {count}",
             Where(path="coloring.by"),
         )
 

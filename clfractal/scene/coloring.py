@@ -4,23 +4,18 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.schema.base import Coordinate, Length, Section, problem
+from clfractal.schema.base import Coordinate, Length, problem
 from clfractal.schema.fields import Usual
+from clfractal.schema.kinds import OneOf
+from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
 from clfractal.schema.stops import Palette, check_order
 from clfractal.schema.trap import Trap
 
 
-class Coloring(Section):
-    """Where the material's colour comes from: the palette at scale * quantity + offset, or a fixed colour.
+class Coloring(ByQuantity):
+    """Where the material's colour comes from: the palette at scale * quantity + offset, or a fixed colour."""
 
-    `solid`: material.color. `normal`: the normal's x, y, z as red, green, blue, from -1..1 to 0..1.
-    The quantities: `iterations`, the smooth escape count; `residual`, how far the pixel's points are from the
-    plane fitted to them, in footprints; `thickness`, from where `along` enters the set to where it leaves it, scene units;
-    `layer_distance`, from the surface to the surface after `layer` iterations, scene units; `trap`, the smallest
-    distance of the orbit from a shape.
-    """
-
-    by: Literal["solid", "normal", "iterations", "residual", "thickness", "layer_distance", "trap"] = Field(
+    by: Annotated[str, OneOf("colorings", lambda kind: kind.of_scenes)] = Field(
         "solid", description="the quantity that chooses the colour"
     )
     palette: Palette = "viridis"
@@ -53,10 +48,15 @@ class Coloring(Section):
     @property
     def uses_palette(self) -> bool:
         """Whether the palette chooses the colour."""
-        return self.by not in ("solid", "normal")
+        return self.kind.uses_palette
+
+    @property
+    def kind(self) -> type[ColoringKind]:
+        """What chooses the colour."""
+        return coloring_kind(self.by)
 
     @model_validator(mode="after")
     def _has_a_way(self) -> Self:
-        if self.by == "thickness" and self.along == "reflection":
-            raise problem("must be view or normal for thickness, got reflection", "along")
+        if "along" in self.kind.keys and self.along not in self.kind.ways:
+            raise problem(f"must be {' or '.join(self.kind.ways)} for {self.by}, got {self.along}", "along")
         return self

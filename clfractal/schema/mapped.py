@@ -1,7 +1,7 @@
 """Values of a material that differ from place to place: a quantity through a curve, or a picture."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self, get_args
+from typing import Annotated, Any, ClassVar, Self, get_args
 
 from pydantic import Discriminator, Field, Tag, model_validator
 from pydantic.fields import FieldInfo
@@ -20,38 +20,24 @@ from clfractal.schema.base import (
     problem,
 )
 from clfractal.schema.fields import Usual
+from clfractal.schema.kinds import OneOf
+from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
 from clfractal.schema.stops import Palette, check_order
 from clfractal.schema.trap import Trap
-
-QUANTITIES = (
-    "iterations",
-    "normal",
-    "height",
-    "distance",
-    "curvature",
-    "thickness",
-    "layer_distance",
-    "trap",
-)
-Quantity = Literal[
-    "iterations", "normal", "height", "distance", "curvature", "thickness", "layer_distance", "trap"
-]
-ASKED = QUANTITIES[4:]
-"""Those for which the formula is asked."""
 
 TextureName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
 
 
-class Map(Section):
+class Map(ByQuantity):
     """What a value follows from place to place: `by` a quantity, or a picture, the `texture`.
 
-    The quantities: `iterations`, the smooth escape count; `normal`, the normal's part along `direction`, -1 to 1; `height`,
-    the place along `direction`; `distance`, that from `center`, scene units; `curvature`, the mean curvature over `step`,
-    one over scene units, above 0 on hills; `thickness`, `layer_distance` and `trap` as of `coloring`, along the normal.
+    What `coloring` measures along a way is measured along the normal here.
     """
 
     tag = "map"
-    by: Quantity | None = Field(None, description="the quantity; null: a `texture`")
+    by: Annotated[str, OneOf("colorings", lambda kind: kind.of_maps)] | None = Field(
+        None, description="the quantity; null: a `texture`"
+    )
     texture: TextureName | None = Field(
         None, description="a picture in the scene's folder or below, shown from three sides"
     )
@@ -92,7 +78,26 @@ class Map(Section):
     @property
     def used_range(self) -> tuple[float, float]:
         """Quantities at its beginning and end."""
-        return self.range if self.range is not None else (-1.0 if self.by == "normal" else 0.0, 1.0)
+        return (
+            self.range if self.range is not None else (self.kind.low if self.kind is not None else 0.0, 1.0)
+        )
+
+    @property
+    def kind(self) -> type[ColoringKind] | None:
+        """What it follows; None if it is a texture."""
+        return coloring_kind(self.by) if self.by is not None else None
+
+    @property
+    def is_asked(self) -> bool:
+        """Whether the formula is asked for it."""
+        return self.kind is not None and self.kind.known == "by_formula"
+
+    @property
+    def own_keys(self) -> tuple[str, ...]:
+        """The keys that count for its quantity alone."""
+        return tuple(
+            key for key in type(self).model_fields if self.kind is not None and key in self.kind.keys
+        )
 
     @property
     def told(self) -> str:
@@ -104,15 +109,8 @@ class Map(Section):
         """The keys that count for what it follows, and are numbers or words."""
         if self.texture is not None:
             return ("texture", "scale", "sharpness")
-        own = {
-            "normal": ("direction",),
-            "height": ("direction",),
-            "distance": ("center",),
-            "curvature": ("step",),
-            "thickness": ("step",),
-            "layer_distance": ("layer", "step"),
-        }
-        return ("by", "range", "repeat", *own.get(str(self.by), ()))
+        own = [key for key in self.own_keys if not isinstance(getattr(self, key), Section)]
+        return ("by", "range", "repeat", *own)
 
     def check(self, high: float, low: float) -> None:
         """Raises a problem if a value of the map may be out of these bounds."""

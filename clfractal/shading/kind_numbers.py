@@ -7,16 +7,8 @@ from collections.abc import Mapping
 from clfractal.device.source import kinds
 
 TRAPS = kinds("elements/traps")
-# In the order of when they are known: with the hit, with all of a pixel's points, by asking the formula.
-COLORINGS = {
-    "solid": 0,
-    "normal": 1,
-    "iterations": 2,
-    "residual": 3,
-    "thickness": 4,
-    "layer_distance": 5,
-    "trap": 6,
-}
+COLORINGS = kinds("elements/colorings")
+KNOWN = {"at_hit": 0, "with_points": 1, "by_formula": 2}
 ALONG = {"view": 0, "normal": 1, "reflection": 2}
 NORMALS = {
     "gradient": 0,
@@ -39,7 +31,7 @@ FEATURES = {
 }
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {
-    "COLORING": COLORINGS,
+    "KNOWN": KNOWN,
     "ALONG": ALONG,
     "NORMAL": NORMALS,
     "FEATURE": FEATURES,

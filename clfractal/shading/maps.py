@@ -17,7 +17,8 @@ from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import VolumeObject
 from clfractal.schema.base import unit
-from clfractal.schema.mapped import ASKED, QUANTITIES, ColorMap, Map, NumberMap, maps_of
+from clfractal.schema.mapped import ColorMap, Map, NumberMap, maps_of
+from clfractal.shading.kind_numbers import COLORINGS
 from clfractal.shading.materials import PBR, material_values, parameter_numbers, used_materials
 
 MAP = Struct(
@@ -25,8 +26,9 @@ MAP = Struct(
     [
         Field("number", "int", 0, "the first number of a lane's material that it sets"),
         Field("count", "int", 0, "how many it sets: 1, or 3 of a colour"),
-        Field("by", "int", 0, "the quantity, one of MAP_..."),
-        Field("asked", "int", 0, "which of the formula's answers that is"),
+        Field("by", "int", 0, "the quantity, COLORING_"),
+        Field("asked", "int", 0, "which of the formula's answers that is; below 0: none"),
+        Field("of_surface", "int", 0, "1: it follows what the surface itself is around a place"),
         Field("table", "int", 0, "where its PALETTE_SIZE colours begin"),
         Field("repeat", "int", 0, "1: the table begins again after its end; 0: its ends go on"),
         Field("scale", "real", 0, "tables per unit of the quantity"),
@@ -41,7 +43,6 @@ MAP = Struct(
     ],
 )
 MAP_DEFINES = {
-    **{f"MAP_{name.upper()}": number for number, name in enumerate(QUANTITIES)},
     # Those with names, and what Phong's is along paths.
     "MOST_MATERIALS": MAX_MATERIALS + 1,
 }
@@ -109,12 +110,12 @@ class MappedMaterials:
     @property
     def relief_asked(self) -> int:
         """How many of `asked`, from the first on, are asked around interactions too."""
-        return len({_question(each) for each in self.relief if each.by in ASKED})
+        return len({_question(each) for each in self.relief if each.is_asked})
 
     @property
     def relief_of_surface(self) -> bool:
         """Whether heights follow what the surface itself is around interactions: its normals and escape counts."""
-        return any(each.by in ("iterations", "normal") for each in self.relief)
+        return any(each.kind is not None and each.kind.of_surface for each in self.relief)
 
     def _width(self, number: int) -> float:
         """The least distance over which a material's slopes are measured, scene units.
@@ -137,7 +138,7 @@ class MappedMaterials:
     def asked(self) -> list[Map]:
         """One map of each quantity for which the formula is asked."""
         every = [*self.relief, *(each for _, each in self.maps)]
-        return list({_question(each): each for each in every if each.by in ASKED}.values())
+        return list({_question(each): each for each in every if each.is_asked}.values())
 
     def records(self, precision: Precision) -> Record:
         """The materials' records."""
@@ -174,13 +175,14 @@ class MappedMaterials:
                 {
                     "number": numbers[name][0],
                     "count": numbers[name][1],
-                    "by": QUANTITIES.index(each.by) if each.by is not None else 0,
-                    "asked": questions.index(_question(each)) if each.by in ASKED else 0,
+                    "by": COLORINGS[each.by] if each.by is not None else 0,
+                    "asked": questions.index(_question(each)) if each.is_asked else -1,
+                    "of_surface": int(each.kind is not None and each.kind.of_surface),
                     "table": index * TABLE * 3,
                     "repeat": int(each.repeat),
                     "scale": 1 / (high - low),
                     "offset": -low / (high - low),
-                    "vector": each.center if each.by == "distance" else unit(each.direction),
+                    "vector": each.center if "center" in each.own_keys else unit(each.direction),
                     "picture": pictures.get(key, 0),
                     "levels": len(sizes) if each.texture is not None else 0,
                     "width": sizes[0][0],
@@ -354,6 +356,4 @@ def _table(each: Map) -> Floats:
 
 def _question(each: Map) -> tuple[object, ...]:
     """What the formula is asked for a map."""
-    if each.by == "trap":
-        return (each.by, each.trap.model_dump_json())
-    return (each.by, each.step, each.layer if each.by == "layer_distance" else 0)
+    return (each.by, *(getattr(each, key) for key in each.own_keys))

@@ -310,7 +310,7 @@ class SceneOperators:
         changes: dict[str, Any] = {"renderer": {"type": kind, "samples": scene.renderer.samples}}
         if kind == "volume":
             changes["renderer"]["resolution"] = 192
-            if scene.coloring.by not in ("solid", "normal"):
+            if scene.coloring.uses_palette:
                 changes["coloring.by"] = "solid"
         if kind == "cut_plane":
             changes["cut_planes"] = []

@@ -2,7 +2,6 @@
 #include "formulas/orbits.h"
 #include "integrators/stages.h"
 #include "shading/coloring.h"
-#include "shading/asked.h"
 #include "shading/bump_places.h"
 
 // Keeps what the formula answers at interactions, or at a place around them. On objects beside the set it has an answer for traps only.
@@ -12,8 +11,9 @@ INLINE void answers_keep(stage s, const interaction *there, int place, mask asks
     const int count = place == AT_INTERACTION ? w.settings->asked_count : w.settings->bump_asked;
     for (int i = 0; i < count; ++i) {
         material_record m = questions + i;
-        const mask answered = m->asks == MAP_TRAP ? asks : of_set;
-        const real answer = pick(answered, asked_quantity(there, answered, m, orbit, k), R(0.0));
+        const mask answered = m->of_objects ? asks : of_set;
+        const real found = coloring_quantity(there->point, there->normal, there->normal, there->cone, answered, m, orbit, k);
+        const real answer = pick(answered, found, R(0.0));
         lanes_store(answer, asked_at(s, place, i, w));
     }
     if (place == AT_INTERACTION || !w.settings->bump_surface) return;
@@ -48,8 +48,7 @@ STAGE(color_interactions) {
         }
         answers_keep(s, &there, place, asks, asks & found, material + 1, orbit, k, w);
     }
-    if (material->coloring <= COLORING_RESIDUAL) return;
-    here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, here.smooth, here.residual, found,
-                                      material, orbit, k);
+    if (material->known != KNOWN_BY_FORMULA) return;
+    here.quantity = coloring_quantity(here.point, here.normal, direction, here.cone, found, material, orbit, k);
     interaction_keep(s, &here, bounce);
 }

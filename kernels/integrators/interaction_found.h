@@ -8,7 +8,8 @@ INLINE void interaction_found(stage s, ray r, real on_path, interaction found, s
     if (s.bounce == 0) STATE_KEEP(s, at_first, STATE_SIGHTING);
     STATE_KEEP(s, cost, STATE_COUNTERS);
     found.found = pick(mask_of(on_path), found.found, R(0.0));
-    if (w.material->coloring == COLORING_RESIDUAL) found.quantity = found.residual;
+    if (w.material->known == KNOWN_WITH_POINTS)
+        found.quantity = value_known(w.material->coloring, found.point, found.normal, found.smooth, found.residual, found.normal);
     interaction_keep(s, &found, s.bounce);
     if (!KEEPS(s, STATE_GATHERED)) send_to_small_lights(s, &found, next_turns, w);
 }

@@ -76,18 +76,11 @@ INLINE void surface_beside(stage s, const interaction *there, int place, vec *no
 
 // At an interaction, where `place` is AT_INTERACTION, or at a place around it.
 INLINE real map_quantity(stage s, const interaction *here, int place, map_record m, world w) {
-    const vec given = vec_splat(m->vector);
     vec normal = here->normal;
     real smooth = here->smooth;
-    if (place != AT_INTERACTION && (m->by == MAP_NORMAL || m->by == MAP_ITERATIONS)) surface_beside(s, here, place, &normal, &smooth, w);
-    if (m->by == MAP_NORMAL) return vec_dot(normal, given);
-    if (m->by == MAP_HEIGHT) return vec_dot(here->point, given);
-    if (m->by == MAP_DISTANCE) {
-        const vec way = vec_sub(here->point, given);
-        return sqrt(vec_dot(way, way));
-    }
-    if (m->by >= MAP_CURVATURE) return lanes_load(asked_at(s, place, m->asked, w));
-    return smooth;
+    if (m->asked >= 0) return lanes_load(asked_at(s, place, m->asked, w));
+    if (place != AT_INTERACTION && m->of_surface) surface_beside(s, here, place, &normal, &smooth, w);
+    return value_known(m->by, here->point, normal, smooth, here->residual, vec_splat(m->vector));
 }
 
 // What a map is at an interaction: a colour, or three times the same number.

@@ -43,18 +43,34 @@ INLINE color phong(color surface, vec normal, vec to_viewer, incidence in, mask 
                     in.strength * (real)(light->color[2]) * (body * surface.b + specular));
 }
 
-// Where coloring.h's quantity lies in the palette, 0 to 1.
+// What chooses colours is a file of `elements/colorings`' folders, with
+//   color NAME_color(vec normal, material_record material)     in `colors`, if it is a colour by itself
+//   real NAME_value(vec point, vec normal, real smooth, real residual, vec given)
+//                                                              in `values`, if it is a number that is known with the interaction; `given`
+//                                                              is a map's direction or place
+// or the function of `coloring.h`.
+#include "elements/colorings"
+#include "elements/colorings/colors"
+#include "elements/colorings/values"
+
+#define VALUE(KIND, name) case COLORING_##KIND: return name##_value(point, normal, smooth, residual, given);
+INLINE real value_known(int kind, vec point, vec normal, real smooth, real residual, vec given) {
+    switch (kind) { VALUES(VALUE) default: return smooth; }
+}
+
+// Where a quantity lies in the palette, 0 to 1.
 INLINE real palette_place(real quantity, material_record material) {
     return place_in_palette(quantity, material->palette_scale, material->palette_offset, material->palette_repeat);
 }
 
 // Whether a point's colour is known as soon as it is met: else one quantity chooses that of all a pixel's points.
-INLINE int is_colored_at_once(material_record material) { return material->coloring <= COLORING_ITERATIONS; }
+INLINE int is_colored_at_once(material_record material) { return material->known == KNOWN_AT_HIT; }
 
-// The surface's own colour M; `quantity` is that of coloring.h.
+// The surface's own colour M; `quantity` is what chooses it.
+#define COLOR(KIND, name) case COLORING_##KIND: return name##_color(normal, material);
 INLINE color surface_color(vec normal, real quantity, material_record material, __global const float *palette) {
-    if (material->coloring == COLORING_SOLID) return color_splat(material->color);
-    // The thesis stores normals as (n + 1) / 2 in RGB (sec. 3.2.1).
-    if (material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
-    return palette_color(palette_place(quantity, material), material->palette_repeat, palette);
+    switch (material->coloring) {
+        COLORS(COLOR)
+        default: return palette_color(palette_place(quantity, material), material->palette_repeat, palette);
+    }
 }

@@ -48,7 +48,9 @@ __kernel void quantities(__global const scalar *points, __global scalar *result,
     // A lane with no normal takes no part.
     const vec normal = load_vec(normals, stride, first), view = load_vec(views, stride, first);
     const mask active = less(R(0.0), vec_dot(normal, normal));
-    const real found = coloring_quantity(point, normal, view, R(0.002), R(7.25), R(0.5), active, material, orbit, k);
+    const real found = material->known == KNOWN_BY_FORMULA
+        ? coloring_quantity(point, normal, view, R(0.002), active, material, orbit, k)
+        : value_known(material->coloring, point, normal, R(7.25), R(0.5), normal);
     store(result + first, found);
 }
 """
@@ -95,7 +97,13 @@ def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> SmallK
     head = kind_text() + "#define PALETTE_SIZE 256\n"
     headers = "".join(
         kernel_file(name)
-        for name in ("formulas/orbit.h", "formulas/solids.h", "shading/coloring.h", "shading/shade.h")
+        for name in (
+            "formulas/orbit.h",
+            "formulas/solids.h",
+            "integrators/sampling.h",
+            "shading/coloring.h",
+            "shading/shade.h",
+        )
     )
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 

@@ -2,56 +2,50 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.quantity import colorings
 from clfractal.viewer.panels import palette_editor
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
-_QUANTITIES = {
-    "solid": "One colour",
-    "normal": "Normal",
-    "iterations": "Iterations",
-    "residual": "Roughness (residual)",
-    "thickness": "Thickness",
-    "layer_distance": "Distance to a layer",
-    "trap": "Orbit trap",
-}
-
 
 def summary(ui: Ui) -> str:
     """For the heading."""
-    return _QUANTITIES[ui.studio.scene.coloring.by].lower()
+    return ui.studio.scene.coloring.kind.title.lower()
 
 
 def draw(ui: Ui) -> None:
     """Draws the panel."""
     scene = ui.studio.scene
     keep = {"coloring.along": "normal"} if scene.coloring.along == "reflection" else {}
-    w.field(ui, "coloring.by", words=_QUANTITIES, keep=keep)
-    coloring = ui.studio.scene.coloring
+    w.field(ui, "coloring.by", words={kind.tag: kind.title for kind in colorings()}, keep=keep)
+    kind = ui.studio.scene.coloring.kind
     if isinstance(scene.renderer, VolumeRenderer):
         w.hint(ui, "A volume is coloured by its transfer function, or by its material.")
         return
-    if coloring.by == "solid":
+    if kind.of_material:
         w.field(ui, "material.color")
-        return
-    if coloring.by == "normal":
-        w.hint(ui, "The normal's x, y and z as red, green and blue.")
+    if kind.hint:
+        w.hint(ui, kind.hint)
+    if not kind.uses_palette:
         return
     palette_editor.draw(ui, "coloring.palette")
     w.fields(ui, "coloring", ("scale", "offset", "repeat"))
-    radius = ui.studio.scene.bounds[1]
-    if coloring.by in ("thickness", "layer_distance"):
-        w.field(ui, "coloring.along", segmented=True)
-        w.field(ui, "coloring.step", start=float(f"{radius / 100:.3g}"), auto=f"{radius / 100:.3g}")
-    if coloring.by == "layer_distance":
-        w.field(ui, "coloring.layer")
-    if coloring.by == "trap":
-        _trap(ui)
+    _own(ui, kind.keys)
 
 
-def _trap(ui: Ui) -> None:
-    w.group(ui, "Trap")
-    fine = {"step": 0.01}
-    used = ui.studio.scene.coloring.trap.used_keys
-    w.fields(ui, "coloring.trap", used, center=fine, direction=fine)
+def _own(ui: Ui, keys: tuple[str, ...]) -> None:
+    """What counts for this quantity alone."""
+    step = float(f"{ui.studio.scene.bounds[1] / 100:.3g}")
+    of: dict[str, dict[str, Any]] = {
+        "along": {"segmented": True},
+        "step": {"start": step, "auto": f"{step:.3g}"},
+    }
+    w.fields(ui, "coloring", [key for key in keys if key != "trap"], **of)
+    if "trap" in keys:
+        w.group(ui, "Trap")
+        fine = {"step": 0.01}
+        used = ui.studio.scene.coloring.trap.used_keys
+        w.fields(ui, "coloring.trap", used, center=fine, direction=fine)

@@ -22,7 +22,7 @@ def material(ui: Ui, name: str) -> None:
 
 def draw(ui: Ui, path: str, found: Map) -> None:
     """The palette, or the curve, of the map at a path; and its trap."""
-    if found.by == "trap":
+    if "trap" in found.own_keys:
         w.fields(ui, f"{path}.trap", found.trap.used_keys)
     if isinstance(found, ColorMap) and found.texture is None:
         palette_editor.draw(ui, f"{path}.palette")

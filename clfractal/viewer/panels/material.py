@@ -23,7 +23,7 @@ def draw(ui: Ui) -> None:
     if name is not None and ui.studio.scene.lighting.mode == "path":
         maps.material(ui, name)
         return
-    if ui.studio.scene.coloring.by == "solid":
+    if ui.studio.scene.coloring.kind.of_material:
         w.field(ui, "material.color")
     elif not w.filtering(ui):
         w.hint(ui, f"The colour comes from the colouring by {w.word(ui.studio.scene.coloring.by).lower()}.")
@@ -65,7 +65,7 @@ def _choice(ui: Ui) -> None:
     found = w.choose("material.name", words, scene.material.name or PHONG, width)
     if found == NEW:
         made = next(name for name in (f"material {n}" for n in range(1, 1000)) if name not in scene.materials)
-        color = None if scene.coloring.by != "solid" else list(scene.material.color)
+        color = None if not scene.coloring.kind.of_material else list(scene.material.color)
         ui.studio.edit({f"materials.{made}": {"base": {"color": color}}, "material.name": made})
     elif found is not None:
         _put(ui, "material.name", None if found == PHONG else found)

@@ -62,7 +62,7 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
     objects = _objects_of(ui, kind)
     if list(objects) != list(scene.objects):
         edits["objects"] = objects
-    if kind == "volume" and scene.coloring.by not in ("solid", "normal"):
+    if kind == "volume" and scene.coloring.uses_palette:
         edits["coloring.by"] = "solid"
     done = ui.studio.edit({**edits, **(changes or {})})
     if not done:

@@ -94,7 +94,7 @@ INLINE first_met follow_path(volume_path *p, const packet_pixels *at, real pictu
         if (!any_lane(met) || bounce > w.settings->bounces) break;
         const cell c = cell_at(place_of(g, number), w.grid.about);
         vec normal = vec_scale(p->direction, R(-1.0));
-        if (bounce == 0 || w.material->coloring == COLORING_NORMAL) {
+        if (bounce == 0 || w.material->of_volumes) {
             const ints entry = brick_at(c, w.grid);
             normal = facing_normal(grid_normal(c, entry, met & is_stored(entry), w.grid), normal);
         }

@@ -129,7 +129,7 @@ INLINE color emission_of(real value, world w) {
 
 // The colour of a value, or that of a normal: the thesis's (n + 1) / 2.
 INLINE color tint_of(real value, vec normal, world w) {
-    if (w.material->coloring == COLORING_NORMAL) return color_of(R(0.5) * normal.x + R(0.5), R(0.5) * normal.y + R(0.5), R(0.5) * normal.z + R(0.5));
+    if (w.material->of_volumes) return surface_color(normal, value, w.material, w.transfer);
     if (!w.settings->tinted) {
         __global const float *same = w.transfer + TRANSFER_SIZE;
         return color_of((real)((scalar)same[0]), (real)((scalar)same[TRANSFER_SIZE]), (real)((scalar)same[2 * TRANSFER_SIZE]));

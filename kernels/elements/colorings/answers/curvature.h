@@ -1,10 +1,8 @@
-// Quantities of a material's maps for which the formula is asked. `m` is one of the records behind the scene's own Material, with what
-// is asked in the fields of its colouring.
-
 // The mean curvature, half the divergence of the normals, above 0 where the set bulges: by differences over `coloring_step`, on the
 // surface of equal distance that lies so far above it, since below it there may be no gradient. A sphere's is then corrected exactly.
-INLINE real mean_curvature(vec point, vec normal, mask active, material_record m, orbit_record orbit, constants k) {
-    const real step = (real)(m->coloring_step);
+INLINE real curvature_answer(vec point, vec normal, vec view_direction, real cone, mask active, material_record material,
+                             orbit_record orbit, constants k) {
+    const real step = (real)(material->coloring_step);
     const vec above = vec_along(point, step, normal);
     vec side, up;
     make_frame(normal, &side, &up);
@@ -20,11 +18,4 @@ INLINE real mean_curvature(vec point, vec normal, mask active, material_record m
     }
     const real mean = R(0.5) * sum;
     return mean / fmax(R(1.0) - mean * step, R(0.1));
-}
-
-INLINE real asked_quantity(const interaction *here, mask active, material_record m, orbit_record orbit, constants k) {
-    if (m->asks == MAP_CURVATURE) return mean_curvature(here->point, here->normal, active, m, orbit, k);
-    if (m->asks == MAP_THICKNESS) return set_thickness(here->point, vec_scale(here->normal, R(-1.0)), here->cone, active, m, orbit, k);
-    if (m->asks == MAP_LAYER_DISTANCE) return layer_distance(here->point, here->normal, active, m, orbit, k);
-    return orbit_trap(here->point, active, m, orbit, k);
 }
