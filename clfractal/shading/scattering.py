@@ -9,6 +9,7 @@ root of the reflectance at normal incidence j / REFLECTANCES. The buffer has, on
     of metals, see `facets.py`   [4][ROUGHNESSES][COSINES + 1]
     fuzz                         [ROUGHNESSES][COSINES + 1]
     GGX of a dielectric          [REFLECTANCES][ROUGHNESSES][COSINES + 1]
+    highlights drawn out         [6][ROUGHNESSES][DRAWN_STEPS][DRAWN_TURNS][DRAWN_COSINES + 1]
 
 where the last number of a row is the mean over the hemisphere, weighted by the cosine, of what lies between the others; but
 for those of metals.
@@ -26,9 +27,12 @@ import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
 from clfractal.files.resources import folder
-from clfractal.shading.facets import repeated_tables
+from clfractal.shading.facets import EVEN_HUNDREDTHS, repeated_tables, wide
 
 COSINES, ROUGHNESSES, REFLECTANCES = 32, 16, 16
+DRAWN_COSINES, DRAWN_TURNS, DRAWN_STEPS = 16, 6, 7
+DRAWN_ROOTS = 3
+"""Reflectances of dielectrics for which there are such tables, their roots from 0.2 in steps of 0.3."""
 SMOOTHEST_PARTS = 512
 """One over the least width of a highlight (GGX's alpha): float32 can still tell its directions apart."""
 SMOOTHEST_FUZZ_PARTS = 4
@@ -37,6 +41,7 @@ SMOOTHEST_FUZZ_PARTS = 4
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 _RADII, _ANGLES = 48, 24
+_MOST_DRAWN = 32.0  # where next to nothing is lost
 
 
 @cache
@@ -76,7 +81,135 @@ def found_albedos() -> Floats:
     roughnesses = np.arange(ROUGHNESSES) / (ROUGHNESSES - 1)
     alphas = np.maximum(roughnesses * roughnesses, 1 / SMOOTHEST_PARTS)
     metals = repeated_tables(cosines, alphas, roughnesses)
-    return np.concatenate([metals.reshape(-1), *albedos]).astype(np.float32)
+    drawn = drawn_out(metals[:2, :, :-1])
+    return np.concatenate([metals.reshape(-1), *albedos, drawn.reshape(-1)]).astype(np.float32)
+
+
+def drawn_out(scales: Doubles) -> Doubles:
+    """Factors for facets whose slopes are wider along a tangent than across it, beside even ones of the same roughness.
+
+    First on the lobe of what a metal reflects more than once, in both of its directions, so that it has all light that is
+    lost (Sinkhorn and Knopp 1967); then on what glass of index 1.5 reflects and refracts, from outside and from within;
+    last on what dielectrics reflect, of DRAWN_ROOTS reflectances.
+
+    Args:
+        scales: of the two parts of that lobe, see `facets.py`; shape (2, ROUGHNESSES, COSINES).
+    """
+    found = np.ones((DRAWN_ROOTS + 3, ROUGHNESSES, DRAWN_STEPS, DRAWN_TURNS, DRAWN_COSINES + 1))
+
+    def fill(k: int) -> None:
+        roughness = k / (ROUGHNESSES - 1)
+        even, even_lost = _drawn_albedos(roughness, 0.0)
+        lobe = _repeating_lobe(roughness, scales[:, k], even_lost)
+        for step in range(1, DRAWN_STEPS):
+            albedo, lost = _drawn_albedos(roughness, step / (DRAWN_STEPS - 1))
+            found[1:, k, step, :, :-1] = albedo / even
+            for table, one, other in zip(found[1:], albedo, even, strict=False):
+                table[k, step, :, -1] = _drawn_mean(one) / _drawn_mean(other)
+            wanted, factor = lost.reshape(-1), np.ones(lost.size)
+            for _ in range(60):
+                factor = np.sqrt(factor * wanted / np.maximum(lobe @ factor, 1e-12))
+            found[0, k, step, :, :-1] = np.minimum(factor, _MOST_DRAWN).reshape(lost.shape)
+
+    in_threads(fill, range(ROUGHNESSES))
+    return found
+
+
+def _drawn_widths(roughness: float, anisotropy: float) -> tuple[float, float]:
+    """Along the tangent and across it, as in `kernels/elements/materials/specular.h`."""
+    rest, least = 1 - anisotropy, 1 / SMOOTHEST_PARTS
+    along = max(roughness * roughness, least) * math.sqrt(2 / (1 + rest * rest))
+    return along, max(rest * along, least)
+
+
+def _drawn_directions() -> Doubles:
+    """Those of the table; shape (3, DRAWN_TURNS, DRAWN_COSINES)."""
+    root, turn = np.linspace(0, 1, DRAWN_COSINES), np.linspace(0, 1, DRAWN_TURNS)[:, None]
+    cosine = np.maximum(root * root, 1e-4)
+    sine = np.sqrt(1 - cosine * cosine)
+    return np.stack(np.broadcast_arrays(sine * turn, sine * np.sqrt(1 - turn * turn), cosine))
+
+
+def _drawn_albedos(roughness: float, anisotropy: float) -> tuple[Doubles, Doubles]:
+    """What the tables but the first one are of, in their order, and what white facets lose; by their directions."""
+    out = _drawn_directions()[..., None, None]
+    widths = np.array([*_drawn_widths(roughness, anisotropy), 1.0])[:, None, None, None, None]
+    height = (np.arange(_RADII) + 0.5)[:, None] / _RADII
+    angle = math.pi * (np.arange(2 * _ANGLES) + 0.5) / _ANGLES
+    stretched = _unit(widths * out)
+    height = 1 - height * (1 + stretched[2])
+    level = np.sqrt(np.maximum(1 - height * height, 0.0))
+    cap = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), height)) + stretched
+    facet = _unit(widths * cap)
+    meeting = np.clip((out * facet).sum(axis=0), 0.0, 1.0)
+    other = 2 * meeting * facet - out
+    one, two = (_drawn_shadow(each, widths) for each in (out, other))
+    weight = np.where(other[2] > 0, (1 + one) / (1 + one + two), 0.0)
+    found = []
+    for across in (1.5, 1 / 1.5):
+        reflects = fresnel(meeting, across)
+        cosine = np.sqrt(np.maximum(1 - (1 - meeting * meeting) / (across * across), 0.0))
+        below = (meeting / across - cosine) * facet - out / across
+        passes = np.where(below[2] < 0, 1 / (1 + _drawn_shadow(below, widths)), 0.0)
+        found.append(reflects * weight + (1 - reflects) * passes)
+    roots = 0.2 + 0.3 * np.arange(DRAWN_ROOTS)
+    found += [weight * fresnel(meeting, (1 + root) / (1 - root)) for root in roots]
+    return np.stack([each.mean(axis=(2, 3)) for each in found]), np.maximum(
+        1 - weight.mean(axis=(2, 3)), 1e-9
+    )
+
+
+def _drawn_shadow(way: Doubles, widths: Doubles) -> Doubles:
+    """Smith's function of GGX, Lambda, of the slopes along a direction."""
+    slopes = ((widths[:2] * way[:2]) ** 2).sum(axis=0) / np.maximum(way[2] ** 2, 1e-12)
+    return np.asarray((np.sqrt(1 + slopes) - 1) / 2)
+
+
+def _drawn_mean(albedo: Doubles) -> float:
+    """Over the hemisphere, weighted by the cosine."""
+    root, angle = (np.arange(64) + 0.5) / 64, (np.arange(32) + 0.5) / 64 * math.pi
+    shares = _drawn_shares(np.cos(angle)[:, None], root).reshape(-1, albedo.size)
+    rows = (shares @ albedo.reshape(-1)).reshape(32, 64)
+    return float((rows * root**3).sum() / (32 * (root**3).sum()))
+
+
+def _drawn_shares(turn: Doubles, root: Doubles) -> Doubles:
+    """How much of a value between them each of the table's directions has; they are the last two axes."""
+    found = [
+        np.maximum(1 - np.abs(np.asarray(at)[..., None] * (count - 1) - np.arange(count)), 0.0)
+        for at, count in ((turn, DRAWN_TURNS), (root, DRAWN_COSINES))
+    ]
+    return np.asarray(found[0][..., :, None] * found[1][..., None, :])
+
+
+def _repeating_lobe(roughness: float, scales: Doubles, lost: Doubles) -> Doubles:
+    """What the lobe of even facets, which lose this light, sends to all directions of the table from each of them."""
+    alpha = wide(roughness)
+    out = _drawn_directions().reshape(3, -1, 1)
+    root, angle = (np.arange(48) + 0.5)[:, None] / 48, 2 * math.pi * (np.arange(64) + 0.5) / 64
+    level = np.sqrt(1 - root**4)
+    way = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), root * root)).reshape(
+        3, 1, -1
+    )
+    h = _unit(out + way)
+    spread = h[0] ** 2 + h[1] ** 2 + alpha * alpha * h[2] ** 2
+    shadows = shadow(out[2], alpha) + shadow(way[2], alpha)
+    lobe = (
+        alpha * alpha / (math.pi * spread * spread) / (4 * out[2] * (1 + shadows))
+        + EVEN_HUNDREDTHS / 100 * way[2]
+    )
+    ends = [
+        [np.interp(np.sqrt(a[2]), np.linspace(0, 1, COSINES), each) for a in (out, way)] for each in scales
+    ]
+    lobe = lobe * sum(one * two for one, two in ends) * np.repeat(root[:, 0], 64)
+    lobe *= lost.reshape(-1, 1) / np.maximum(lobe.sum(axis=1, keepdims=True), 1e-30)
+    turn = np.abs(np.cos(angle)) + 0 * root
+    shares = _drawn_shares(turn, root + 0 * angle).reshape(-1, DRAWN_TURNS * DRAWN_COSINES)
+    return np.asarray(lobe @ shares)
+
+
+def _unit(a: Doubles) -> Doubles:
+    return np.asarray(a / np.sqrt((a * a).sum(axis=0)))
 
 
 def table_cosines() -> Doubles:
@@ -95,13 +228,14 @@ def mean_albedo(rows: Doubles) -> Doubles:
 
 
 def fresnel(cosine: Doubles, ior: float) -> Doubles:
-    """The reflectance of a dielectric's smooth boundary from outside, for unpolarised light."""
+    """The reflectance of a dielectric's smooth boundary, for unpolarised light; `ior` is below 1 from within."""
     if ior == 1:
         return np.zeros_like(cosine)
-    g = np.sqrt(ior * ior - 1 + cosine * cosine)
+    square = ior * ior - 1 + cosine * cosine
+    g = np.sqrt(np.maximum(square, 0.0))
     a = (g - cosine) / (g + cosine)
     b = (cosine * (g + cosine) - 1) / (cosine * (g - cosine) + 1)
-    return np.asarray(a * a * (1 + b * b) / 2)
+    return np.asarray(np.where(square > 0, a * a * (1 + b * b) / 2, 1.0))
 
 
 def visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles, Doubles]:
