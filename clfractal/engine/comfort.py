@@ -171,7 +171,7 @@ def _has_depth(job: Job) -> bool:
     return (
         "Z" in job.channels
         and scene.layout is None
-        and scene.renderer.type != "cut_plane"
+        and not scene.renderer.is_flat
         and scene.image.width * scene.image.height <= _MOST_PIXELS
     )
 

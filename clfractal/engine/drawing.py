@@ -6,6 +6,7 @@ import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from importlib import import_module
 from typing import Any
 
 import numpy as np
@@ -366,17 +367,8 @@ class Drawing:
 
 def _kernel_of(renderer: str) -> type[TileKernel]:
     """The kernel of a kind of renderer. Each is imported when it is needed: volumes bring all of `voxels` along."""
-    if renderer == "volume":
-        from clfractal.integrators.volume import VolumeKernel
-
-        return VolumeKernel
-    if renderer == "cut_plane":
-        from clfractal.integrators.cut_plane import CutPlaneKernel
-
-        return CutPlaneKernel
-    from clfractal.integrators.surface import SurfaceKernel
-
-    return SurfaceKernel
+    kernel: type[TileKernel] = import_module(f"clfractal.integrators.{renderer}").KERNEL
+    return kernel
 
 
 def _size(argument: KernelArgument) -> int:

@@ -71,3 +71,6 @@ class CutPlaneKernel(TileKernel):
             only_plane(renderer, iterations, precision),
             escape_palette(renderer.colors),
         ]
+
+
+KERNEL = CutPlaneKernel

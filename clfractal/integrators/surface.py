@@ -273,3 +273,6 @@ def program_texts(scene: Scene, plan: Plan, *, all_stages: bool = False) -> list
             flat = flat_text(each.entry, generated={**formula, **_structs()}, defines=defines(each.defines))
             texts.append(ProgramText(each.name, flat, kernels))
     return texts
+
+
+KERNEL = SurfaceKernel

@@ -490,3 +490,6 @@ def _zoom(scene: Scene) -> float:
 
 def _one_of(pools: Sequence[cl.Buffer], pool: int) -> cl.Buffer:
     return pools[min(pool, len(pools) - 1)]
+
+
+KERNEL = VolumeKernel

@@ -231,7 +231,7 @@ def _check_planes(scene: Scene) -> None:
         raise SceneError(
             f"must be at most {MAX_PLANES} planes in total, got {count}", Where(path="cut_planes")
         )
-    if count and isinstance(scene.renderer, CutPlaneRenderer):
+    if count and scene.renderer.is_flat:
         raise SceneError("are for surface and volume renderers; remove them", Where(path="cut_planes"))
 
 

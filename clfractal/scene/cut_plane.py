@@ -44,6 +44,9 @@ class CutPlaneRenderer(Sampled):
     """The formula on a plane: escape counts as colours, one evaluation for each sample."""
 
     tag = "cut_plane"
+    title = "Plane"
+    place = 30
+    is_flat = True
     type: Literal["cut_plane"] = "cut_plane"
     plane: Plane = Field(default_factory=dict, validate_default=True, description="where the plane lies")
     colors: EscapeColors = Field(

@@ -6,7 +6,8 @@ from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
+from clfractal.scene.objects import KINDS, MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
+from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.mapped import maps_of
@@ -32,7 +33,9 @@ def check_objects(scene: Scene) -> None:
 
 def can_show(renderer: str, kind: str) -> bool:
     """Whether a type of renderer shows objects of a type."""
-    return renderer == "surface" or kind not in ("water", "volume")
+    return RENDERERS[renderer].shows_every_object or not any(
+        each.of_rays for each in KINDS if each.tag == kind
+    )
 
 
 def _check_named(scene: Scene) -> None:

@@ -22,7 +22,7 @@ from clfractal.schema.base import (
     unit,
 )
 from clfractal.schema.fields import SCALE, Usual
-from clfractal.schema.kinds import Element, in_order, members, one_of
+from clfractal.schema.kinds import in_order, members, one_of
 from clfractal.schema.names import ObjectName
 from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, turned_axes
 
@@ -59,6 +59,7 @@ class WaterObject(Level):
     tag = "water"
     title = "Water"
     place = 20
+    of_rays = True
     type: Literal["water"] = "water"
     waves: Waves = Field(default_factory=dict, validate_default=True, description="its waves")
 
@@ -123,6 +124,7 @@ class VolumeObject(ObjectBase):
     tag = "volume"
     title = "Volume"
     place = 90
+    of_rays = True
     type: Literal["volume"] = "volume"
     file: str = Field(min_length=1, description="its values: a NRRD or NPY file beside the scene")
     size: Annotated[Length, SCALE] | None = Field(
@@ -167,7 +169,7 @@ class VolumeObject(ObjectBase):
         return self
 
 
-_KINDS: list[type[Element]] = [*members("shapes"), WaterObject, FormulaObject, VolumeObject]
+_KINDS: list[type[ObjectBase]] = [*members("shapes"), WaterObject, FormulaObject, VolumeObject]
 KINDS = in_order(_KINDS)
 if TYPE_CHECKING:
     SceneObject: TypeAlias = ObjectBase

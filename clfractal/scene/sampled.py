@@ -1,18 +1,34 @@
 """Keys that every renderer has: the samples of a pixel, how they are combined, and the number type."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Mapping
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.schema.base import Section, problem
+from clfractal.schema.base import problem
 from clfractal.schema.fields import Usual
+from clfractal.schema.kinds import Element
 
 # The default of `min_samples`: fewer samples do not show how much a pixel's samples scatter.
 USUAL_MIN_SAMPLES = 16
 
 
-class Sampled(Section):
-    """Samples, their filter, and the number type."""
+class Sampled(Element):
+    """Samples, their filter, and the number type: what every renderer has.
+
+    A renderer's kernel is the `KERNEL` of the file in `clfractal/integrators` that has the name of its tag.
+
+    Attributes:
+        first: values that the window begins with.
+        is_flat: whether all that it shows lies in one plane, which other planes cannot cut.
+        has_own_colors: whether what it shows has colours of its own, in the place of the coloring's palette.
+        shows_every_object: whether it shows those, too, that only rays can be sent for.
+    """
+
+    first: ClassVar[Mapping[str, Any]] = {}
+    is_flat: ClassVar[bool] = False
+    has_own_colors: ClassVar[bool] = False
+    shows_every_object: ClassVar[bool] = False
 
     samples: Annotated[int, Usual(1, 1024)] = Field(
         1, ge=1, le=65_536, description="rays per pixel; with `noise` their maximum number"

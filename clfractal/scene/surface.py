@@ -46,6 +46,9 @@ class SurfaceRenderer(Sampled):
     """The boundary of the set, found by marching along each ray."""
 
     tag = "surface"
+    title = "Surface"
+    place = 10
+    shows_every_object = True
     type: Literal["surface"] = "surface"
     search: Literal["distance", "steps"] = Field(
         "distance",

@@ -1,7 +1,8 @@
 """The volume renderer's settings: the box, the values of its voxels, and how rays sample them."""
 
+from collections.abc import Mapping
 from math import prod
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import Field, Tag, model_validator
 
@@ -131,6 +132,11 @@ class VolumeRenderer(Sampled):
     """Rays through a grid of voxels, front to back, until nothing shines through."""
 
     tag = "volume"
+    title = "Volume"
+    place = 20
+    has_own_colors = True
+    # The grid takes a moment to fill, so the first one is small.
+    first: ClassVar[Mapping[str, Any]] = {"resolution": 192}
     type: Literal["volume"] = "volume"
     box: Box | None = Field(
         None, description="the box that is filled; null: a cube around the formula's bounds"

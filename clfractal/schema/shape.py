@@ -30,7 +30,13 @@ def turned_axes(rotation: Vector) -> tuple[Vector, Vector, Vector]:
 
 
 class ObjectBase(Element):
-    """Keys that every object has."""
+    """Keys that every object has.
+
+    Attributes:
+        of_rays: whether only rays find it, and no voxels or planes.
+    """
+
+    of_rays: ClassVar[bool] = False
 
     material: MaterialName | None = Field(
         None, description="one of `materials`; null: as `material`, in its colour"

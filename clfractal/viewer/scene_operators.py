@@ -11,6 +11,7 @@ from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.rectangle import Plane
+from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.stereo import Mode
 from clfractal.schema.base import Vector
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
@@ -37,7 +38,6 @@ _STEP = 24.0  # pixels of a key's orbit or pan
 _ZOOM = 0.85
 _TURN = 5.0  # degrees
 _MOVE = 0.04  # of a plane's height
-_RENDERERS = ("surface", "volume", "cut_plane")
 
 
 class SceneOperators:
@@ -306,13 +306,15 @@ class SceneOperators:
                 holds=lambda: self.studio.scene.layout is not None,
             )
             return
-        kind = _RENDERERS[(_RENDERERS.index(scene.renderer.type) + 1) % len(_RENDERERS)]
-        changes: dict[str, Any] = {"renderer": {"type": kind, "samples": scene.renderer.samples}}
-        if kind == "volume":
-            changes["renderer"]["resolution"] = 192
-            if scene.coloring.uses_palette:
-                changes["coloring.by"] = "solid"
-        if kind == "cut_plane":
+        words = list(RENDERERS)
+        kind = words[(words.index(scene.renderer.type) + 1) % len(words)]
+        other = RENDERERS[kind]
+        changes: dict[str, Any] = {
+            "renderer": {"type": kind, "samples": scene.renderer.samples, **other.first}
+        }
+        if other.has_own_colors and scene.coloring.uses_palette:
+            changes["coloring.by"] = "solid"
+        if other.is_flat:
             changes["cut_planes"] = []
         shown = {name: each for name, each in scene.objects.items() if can_show(kind, each.tag)}
         if len(shown) < len(scene.objects):

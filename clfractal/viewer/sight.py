@@ -217,7 +217,7 @@ def sight_of(scene: Scene, shown: Shown | None, free: Area = (0.0, 0.0, 1.0, 1.0
         size = _size(scene)
         return Sight(scene_view(scene), size, None, _part(free, size), scene.extent)
     views = shown.frame.views
-    number = next((n for n, each in enumerate(views) if each.scene.renderer.type != "cut_plane"), 0)
+    number = next((n for n, each in enumerate(views) if not each.scene.renderer.is_flat), 0)
     return sight_in(scene, views[number], shown.depths[number], free)
 
 

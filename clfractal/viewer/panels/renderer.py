@@ -8,6 +8,7 @@ from imgui_bundle import imgui
 
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
+from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import theme
@@ -15,9 +16,7 @@ from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.metadata import metas, plain
 from clfractal.viewer.panels.ui import Ui
 
-KINDS = {"surface": "Surface", "volume": "Volume", "cut_plane": "Plane"}
-# A volume's grid takes a moment to fill, so the first one is small.
-_FIRST_RESOLUTION = 192
+KINDS = {word: kind.title for word, kind in RENDERERS.items()}
 
 
 def summary(ui: Ui) -> str:
@@ -52,17 +51,18 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
     kept = ui.memory.setdefault("renderer.kept", {})
     kept[now["type"]] = {"renderer": now, "cut_planes": plain(scene.cut_planes)}
     known = kept.get(kind, {})
-    first: dict[str, Any] = {"type": kind, **({"resolution": _FIRST_RESOLUTION} if kind == "volume" else {})}
+    other = RENDERERS[kind]
+    first: dict[str, Any] = {"type": kind, **other.first}
     common = {name: now[name] for name in Sampled.model_fields}
     edits: dict[str, Any] = {"renderer": {**known.get("renderer", first), **common}}
-    if kind == "cut_plane":
+    if other.is_flat:
         edits["cut_planes"] = []
-    elif now["type"] == "cut_plane" and not scene.cut_planes and known.get("cut_planes"):
+    elif scene.renderer.is_flat and not scene.cut_planes and known.get("cut_planes"):
         edits["cut_planes"] = known["cut_planes"]
     objects = _objects_of(ui, kind)
     if list(objects) != list(scene.objects):
         edits["objects"] = objects
-    if kind == "volume" and scene.coloring.uses_palette:
+    if other.has_own_colors and scene.coloring.uses_palette:
         edits["coloring.by"] = "solid"
     done = ui.studio.edit({**edits, **(changes or {})})
     if not done:
