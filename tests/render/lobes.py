@@ -45,7 +45,8 @@ COSINES = (0.1, 0.35, 0.7, 1.0)
 
 
 def material(values: dict[str, Any]) -> PbrMaterial:
-    return PbrMaterial.model_validate(values)
+    found: PbrMaterial = PbrMaterial.model_validate(values)
+    return found
 
 
 def toward(cosine: float) -> Floats:

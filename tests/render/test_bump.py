@@ -420,7 +420,7 @@ def test_reliefs_move_in_films() -> None:
 
     middle = Movement(scene).scene(1).materials["m"].bump
     assert middle.width == pytest.approx(0.2, abs=0.05)
-    assert middle.height.curve[1][1] == pytest.approx(0.3, abs=0.05)  # type: ignore[union-attr]
+    assert middle.height.curve[1][1] == pytest.approx(0.3, abs=0.05)
 
 
 def test_a_scene_with_a_relief_is_written_and_read() -> None:

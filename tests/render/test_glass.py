@@ -22,7 +22,8 @@ Floats = npt.NDArray[np.floating[Any]]
 def glass(roughness: float, ior: float = 1.5, **more: Any) -> PbrMaterial:
     """Clear glass, unless more is said."""
     values = {"specular": {"roughness": roughness, "ior": ior}, "transmission": {"weight": 1}, **more}
-    return PbrMaterial.model_validate(values)
+    found: PbrMaterial = PbrMaterial.model_validate(values)
+    return found
 
 
 WHITE: dict[str, Any] = {"color": [1, 1, 1]}
