@@ -20,7 +20,6 @@ from __future__ import annotations
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
 from clfractal.shading.scattering import (
@@ -37,13 +36,13 @@ from clfractal.shading.scattering import (
     table_cosines,
     visible_normals,
 )
+from clfractal.shading.spectrum import SEEN, seen_colors
 
 WAVELENGTHS = 64
 LEAST_INDEX = 1.005
 """The index of refraction of glass, at the least: float32 cannot tell where light is bent to below it."""
 # Fraunhofer's lines d, F and C, by which Abbe numbers are told, in nanometres.
 _LINE_D, _LINE_F, _LINE_C = 587.6, 486.1, 656.3
-_SEEN = (380.0, 720.0)
 
 
 @cache
@@ -99,7 +98,7 @@ def _refracted(cosine: Doubles, facet: Doubles, meeting: Doubles, across: float,
 
 def wavelengths() -> Doubles:
     """The table of wavelengths, shape (WAVELENGTHS + 1, 4)."""
-    nanometres = np.linspace(*_SEEN, 2001)
+    nanometres = np.linspace(*SEEN, 2001)
     colors = seen_colors(nanometres)
     total = np.concatenate([[0.0], np.cumsum((colors[1:] + colors[:-1]).sum(axis=1))])
     places = np.interp(np.linspace(0, 1, WAVELENGTHS + 1), total / total[-1], nanometres)
@@ -110,25 +109,3 @@ def wavelengths() -> Doubles:
     weights /= np.trapezoid(weights, dx=1 / WAVELENGTHS, axis=0)
     bend = (places**-2 - _LINE_D**-2) / (_LINE_F**-2 - _LINE_C**-2)
     return np.concatenate([bend[:, None], weights], axis=1)
-
-
-def seen_colors(nanometres: npt.NDArray[np.float64]) -> Doubles:
-    """Linear Rec. 709 of light of one wavelength, none below 0, each with the same sum over all wavelengths.
-
-    By Wyman, Sloan and Shirley 2013, Simple Analytic Approximations to the CIE XYZ Color Matching Functions.
-    """
-
-    def lobe(height: float, middle: float, before: float, after: float) -> Doubles:
-        width = np.where(nanometres < middle, before, after)
-        return np.asarray(height * np.exp(-0.5 * ((nanometres - middle) / width) ** 2))
-
-    x = lobe(1.056, 599.8, 37.9, 31.0) + lobe(0.362, 442.0, 16.0, 26.7) + lobe(-0.065, 501.1, 20.4, 26.2)
-    y = lobe(0.821, 568.8, 46.9, 40.5) + lobe(0.286, 530.9, 16.3, 31.1)
-    z = lobe(1.217, 437.0, 11.8, 36.0) + lobe(0.681, 459.0, 26.0, 13.8)
-    matrix = [[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.0415], [0.0557, -0.2040, 1.0570]]
-    return np.asarray(np.maximum(np.stack([x, y, z], axis=-1) @ np.array(matrix).T, 0.0) / _SUMS)
-
-
-# Sums over wavelengths of the three colours as above, so that light of all wavelengths alike is white.
-_SUMS = np.ones(3)
-_SUMS = seen_colors(np.linspace(*_SEEN, 2001)).sum(axis=0) / 1000

@@ -10,9 +10,12 @@ root of the reflectance at normal incidence j / REFLECTANCES. The buffer has, on
     fuzz                         [ROUGHNESSES][COSINES + 1]
     GGX of a dielectric          [REFLECTANCES][ROUGHNESSES][COSINES + 1]
     highlights drawn out         [6][ROUGHNESSES][DRAWN_STEPS][DRAWN_TURNS][DRAWN_COSINES + 1]
+    facets that are met          [3][ROUGHNESSES][COSINES + 1]
+    colours of wavenumbers       [WAVES][3], see `spectrum.py`
 
 where the last number of a row is the mean over the hemisphere, weighted by the cosine, of what lies between the others; but
-for those of metals.
+for those of metals. Facets that are met are told by what they would reflect if each reflected all, and by the mean and the
+spread of the cosine at which they are met, so that a reflectance at a few angles stands for that at all.
 
 They travel with the program, since the first picture along paths would wait for them: `docs/make_tables.py` writes them.
 """
@@ -28,6 +31,7 @@ import numpy.typing as npt
 from clfractal.device.threads import in_threads
 from clfractal.files.resources import folder
 from clfractal.shading.facets import EVEN_HUNDREDTHS, repeated_tables, wide
+from clfractal.shading.spectrum import wave_colors
 
 COSINES, ROUGHNESSES, REFLECTANCES = 32, 16, 16
 DRAWN_COSINES, DRAWN_TURNS, DRAWN_STEPS = 16, 6, 7
@@ -62,6 +66,7 @@ def found_albedos() -> Floats:
     width = COSINES + 1
     fuzz = np.empty((ROUGHNESSES, width))
     dielectric = np.empty((REFLECTANCES, ROUGHNESSES, width))
+    met = np.empty((3, ROUGHNESSES, width))
     cosines = table_cosines()
 
     def fill(k: int) -> None:
@@ -72,17 +77,19 @@ def found_albedos() -> Floats:
         for j in range(REFLECTANCES):
             root = j / REFLECTANCES
             dielectric[j, k, :-1] = (weight * fresnel(meeting, (1 + root) / (1 - root))).mean(axis=(1, 2))
+        met[:, k, :-1] = _met(weight, meeting)
         fuzz[k, :-1] = _fuzz_albedo(cosines, roughness)
 
     in_threads(fill, range(ROUGHNESSES))
-    for table in (fuzz, dielectric):
+    for table in (fuzz, dielectric, met):
         table[..., -1] = mean_albedo(table[..., :-1])
     albedos = [np.minimum(part, 1.0).reshape(-1) for part in (fuzz, dielectric)]
     roughnesses = np.arange(ROUGHNESSES) / (ROUGHNESSES - 1)
     alphas = np.maximum(roughnesses * roughnesses, 1 / SMOOTHEST_PARTS)
     metals = repeated_tables(cosines, alphas, roughnesses)
     drawn = drawn_out(metals[:2, :, :-1])
-    return np.concatenate([metals.reshape(-1), *albedos, drawn.reshape(-1)]).astype(np.float32)
+    found = [metals.reshape(-1), *albedos, drawn.reshape(-1), met.reshape(-1), wave_colors().reshape(-1)]
+    return np.concatenate(found).astype(np.float32)
 
 
 def drawn_out(scales: Doubles) -> Doubles:
@@ -258,6 +265,14 @@ def visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles, D
     h = h / np.sqrt((h * h).sum(axis=0))
     meeting = np.clip(h[0] * sine + h[2] * cosine, 0.0, 1.0)
     return cosine, h[2], meeting
+
+
+def _met(weight: Doubles, meeting: Doubles) -> Doubles:
+    """Of facets with these weights their sum, and the mean and the spread of the cosine; shape (3, cosines)."""
+    total = weight.mean(axis=(1, 2))
+    mean = (weight * meeting).mean(axis=(1, 2)) / total
+    square = (weight * (meeting - mean[:, None, None]) ** 2).mean(axis=(1, 2)) / total
+    return np.stack([total, mean, np.sqrt(square)])
 
 
 def shadow(cosine: Doubles, alpha: float) -> Doubles:

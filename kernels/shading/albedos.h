@@ -6,6 +6,13 @@
 #define REPEATED_TABLES 4   // of metals, see `clfractal/shading/facets.py`
 #define ALBEDO_FUZZ (REPEATED_TABLES * ALBEDO_TABLE)
 #define ALBEDO_DIELECTRIC (ALBEDO_FUZZ + ALBEDO_TABLE)
+// How much light visible facets reflect at most, and the mean and the spread of its cosine with them; colours of wavenumbers.
+// Their numbers are those of `clfractal/shading/spectrum.py`.
+#define WAVE_COUNT 48
+#define WAVE_SHORTEST_NM 380
+#define WAVE_LONGEST_NM 720
+#define WAVE_COLORS (ALBEDO_ALL - 3 * WAVE_COUNT)
+#define FACETS_MET (WAVE_COLORS - 3 * ALBEDO_TABLE)
 // With glass (`clfractal/shading/glass.py`): rough glass, seen from outside and from inside; wavelengths.
 #define ALBEDO_GLASS ALBEDO_ALL   // behind all others
 #define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_TABLE)

@@ -7,10 +7,17 @@
 
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
 
+// With which probability a facet of glass is taken to reflect.
+INLINE real mirror_share(const bsdf *b, real cosine) {
+    const real reflects = fresnel_across(cosine, b->clear.mirrors);
+    return reflects + (R(1.0) - reflects) * b->more;
+}
+
 // With which probability each lobe is sampled: about by what it reflects.
 INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
     real of_gloss = R(0.0);
     if (any_of(b->dielectric * b->root)) of_gloss = specular_albedo(b, b->out, tables).of_direction;
+    of_gloss += (R(1.0) - of_gloss) * b->more;
     of_gloss = pick(b->emerges, R(0.0), of_gloss);
     const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
     real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
@@ -35,6 +42,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.relief = 0;
     b.leans = b.side;
     b.level = R(1.0);
+    b.film.weight = b.more = R(0.0);
     b.out = bsdf_local(&b, to_viewer);
     b.seen = less(R(0.0), b.out.z);
     b.out.z = fmax(b.out.z, R(1e-4));
@@ -78,6 +86,7 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
         }
         o.of_direction = pick(b->emerges, R(0.0), o.of_direction);
         body = color_scale(body, b->bare);
+        if (any_of(b->film.weight)) body = color_mul(body, b->film.through);
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
@@ -105,9 +114,9 @@ INLINE real bsdf_densities(const bsdf *b, vec toward, real broad, real sharp) {
     real facets = of_gloss, beyond = R(0.0);
     if (any_of(b->clear.weight)) {
         const glass *g = &b->clear;
-        facets += b->by_glass * sharp * fresnel_across(vec_dot(b->out, h), g->mirrors);
+        facets += b->by_glass * sharp * mirror_share(b, vec_dot(b->out, h));
         const vec bends = bending_facet(b->out, i, g->across);
-        const real bent = b->by_glass * (R(1.0) - fresnel_across(vec_dot(b->out, bends), g->mirrors)) * bending_density(g, b->out, i, bends);
+        const real bent = b->by_glass * (R(1.0) - mirror_share(b, vec_dot(b->out, bends))) * bending_density(g, b->out, i, bends);
         beyond = sharp * (bent + b->by_beyond * fmax(-i.z, R(0.0)) / BSDF_PI);
     }
     const real sum = hemisphere + facets * ggx_density(b->out, h, b->facets) + of_coat * ggx_density(b->out, h, b->coat_facets);
@@ -124,7 +133,7 @@ INLINE vec bsdf_sample(const bsdf *b, real choice, real u, real v, mask *usable)
     if (any_of(b->clear.weight)) {
         const real before = b->by_coat + b->by_gloss, after = before + b->by_glass;
         const mask facet = ~coat & ~gloss & less(choice, after), beyond = ~coat & ~gloss & ~facet & less(choice, after + b->by_beyond);
-        const mask bends = facet & less(fresnel_across(vec_dot(b->out, h), b->clear.mirrors), (choice - before) / b->by_glass);
+        const mask bends = facet & less(mirror_share(b, vec_dot(b->out, h)), (choice - before) / b->by_glass);
         i = vec_pick(bends, refracted_at(b->out, h, b->clear.across), vec_pick(facet, mirrored, i));
         i.z = pick(beyond, -i.z, i.z);
         below = bends | beyond;

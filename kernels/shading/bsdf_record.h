@@ -17,6 +17,14 @@ typedef struct {
     real crosses;
 } glass;
 
+// A film on the boundary of the base.
+typedef struct {
+    real weight;             // part of the surface that has it
+    real thickness, ior;     // micrometres; index of refraction
+    color through;           // what reaches the body, over what the boundary alone lets through
+    color again;             // a metal's reflectance straight on with it, for light that meets several facets
+} film;
+
 // A material at an interaction, ready to scatter.
 typedef struct {
     vec side, up, normal;   // the frame of all lobes ...
@@ -39,6 +47,8 @@ typedef struct {
     real by_glass, by_beyond; // probabilities of its facets, and of the hemisphere beyond
     mask emerges;             // whether light comes from below the boundary, as from a white body whose viewer is below, too
     real bare;                // part of the body that is none of a medium
+    film film;
+    real more;                // part of the light that the boundary lets through which lobes are chosen as if it were reflected
     color below; real by_below; // what goes below the boundary, over the probability of choosing that, the last part of all choices
 } bsdf;
 

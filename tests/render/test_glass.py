@@ -11,7 +11,8 @@ import pytest
 from scipy.stats import chi2
 
 from clfractal.scene.materials import PbrMaterial
-from clfractal.shading.glass import fresnel_across, seen_colors, wavelengths
+from clfractal.shading.glass import fresnel_across, wavelengths
+from clfractal.shading.spectrum import seen_colors
 from tests.render.lobes import COSINES, numbers, toward
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.variants import one_of

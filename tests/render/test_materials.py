@@ -11,6 +11,7 @@ import pytest
 from clfractal.shading.glass import found_glass, glass_tables
 from clfractal.shading.scattering import COSINES as COSINES_OF_TABLES
 from clfractal.shading.scattering import REFLECTANCES, ROUGHNESSES, albedo_tables, found_albedos, fresnel
+from clfractal.shading.spectrum import WAVES
 from tests.render.lobes import COSINES, LOBES, NO_GLOSS, Floats, hemisphere, material, numbers, toward
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
@@ -125,8 +126,12 @@ def test_tables_are_albedos() -> None:
     assert table.dtype == np.float32
     # Those of metals, the first four, are factors of lobes; behind those of fuzz and dielectrics there may be more factors.
     each = ROUGHNESSES * (COSINES_OF_TABLES + 1)
-    assert table.min() >= 0
+    assert table[: -3 * WAVES].min() >= 0
     assert table[4 * each : (5 + REFLECTANCES) * each].max() <= 1
+
+
+def test_colours_of_wavenumbers_are_white_together() -> None:
+    assert np.abs(albedo_tables()[-3 * WAVES :].reshape(WAVES, 3).sum(axis=0) - 1).max() < 1e-6
 
 
 def test_tables_that_travel_with_the_program_are_what_is_found() -> None:

@@ -33,13 +33,14 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several,
     const real twice = lobe * o.twice * other.twice, more = lobe * o.more * other.more;
     // After more than two facets each time about as much goes on to the next one.
     const real onward = (real)((scalar)REPEATED_AGAIN_TENTHS * S(0.1)) * more / fmax(twice + more, (real)(REAL_SMALLEST));
+    const color again = any_of(b->film.weight) ? b->film.again : b->metal;
     color sum;
 #define METAL_PART(c)                                                                                                       \
     {                                                                                                                       \
-        const real dip = metal_dip(b->metal.c, b->edge.c);                                                                  \
-        const real between = metal_reflects(b->metal.c, dip, o.between[0], o.between[1]);                                   \
-        const real ends = metal_reflects(b->metal.c, dip, o.first[0], o.first[1])                                           \
-                          * metal_reflects(b->metal.c, dip, other.first[0], other.first[1]);                                \
+        const real dip = metal_dip(again.c, b->edge.c);                                                                     \
+        const real between = metal_reflects(again.c, dip, o.between[0], o.between[1]);                                      \
+        const real ends = metal_reflects(again.c, dip, o.first[0], o.first[1])                                              \
+                          * metal_reflects(again.c, dip, other.first[0], other.first[1]);                                   \
         const real repeats = twice + more * between * (R(1.0) - onward) / (R(1.0) - onward * between);                      \
         sum.c = single * fresnel_metal(meeting, b->metal.c, b->edge.c) + ends * repeats;                                    \
     }
