@@ -54,6 +54,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     below_begins(&b, p, inside);
     coat_covers(&b, p, tables);
     fuzz_covers(&b, tables);
+    if (any_of(p->thin_film_weight)) film_begins(&b, p, tables);
     bsdf_choices(&b, tables);
     return b;
 }
@@ -65,16 +66,18 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
 INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __global const float *tables) {
     vec i = bsdf_local(b, toward);
     const mask over = b->seen & less(R(0.0), i.z);
-    color below = color_of(R(0.0), R(0.0), R(0.0));
+    const color none = color_of(R(0.0), R(0.0), R(0.0));
+    color below = none;
     const mask under = b->seen & less(i.z, R(0.0));
     if (any_lane(under & less(R(0.0), b->clear.weight))) {
         const color passes = color_scale(glass_passes(&b->clear, b->out, i, tables), b->clear.weight);
         below = color_pick(under, color_scale(color_mul(passes, THROUGH_LAYERS(b)), sharp), below);
     }
+    const vec from = i;
     i.z = fmax(i.z, R(1e-6));
     const vec h = middle_way(b->out, i);
     const real single = ggx_value(b->out, i, h, b->facets) * lobe_share(broad, sharp, b->facets.alpha);
-    color sum = color_of(R(0.0), R(0.0), R(0.0));
+    color sum = none;
     if (any_of(b->dielectric)) {
         color body = eon_value(b->body, b->out, i, b->rough_body);
         albedo o = {R(0.0), R(0.0)}, other = o;
@@ -98,6 +101,11 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
         sum = color_add(sum, color_scale(tint, reflects));
     }
     if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, broad, tables), b->metalness));
+    if (any_of(b->film.weight)) {
+        color beyond = none;
+        film_adds(b, &from, &h, single, ggx_value(b->out, i, h, b->facets) * sharp, tables, &sum, &beyond);
+        below = color_add(below, color_pick(under, color_scale(color_mul(beyond, THROUGH_LAYERS(b)), -sharp), none));
+    }
     if (any_of(b->coat)) sum = coat_over(b, sum, i, h, broad, sharp);
     if (any_of(brightest(b->fuzz))) sum = fuzz_over(b, sum, i, broad);
     return color_pick(over, sum, below);
