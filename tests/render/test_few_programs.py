@@ -82,6 +82,11 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
         },
         {"materials"},
     ),
+    "tangent": (
+        {"materials": {"m": {"specular": {"anisotropy": 0.8}}}, "material": {"name": "m"}},
+        set(),
+    ),
+    "film": ({"materials": {"m": {"thin_film": {"weight": 1}}}, "material": {"name": "m"}}, set()),
     "glass": ({"materials": {"m": GLASS}, "material": {"name": "m"}}, {"glass"}),
     "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"random_walk", "media"}),
     "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"random_walk", "media"}),
