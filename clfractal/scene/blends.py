@@ -67,6 +67,11 @@ def is_subsurface(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bo
     return any(each.subsurface.has("weight") for each in made_of(material, named))
 
 
+def has_film(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+    """Whether a material, or a part of what it is blended of, has a thin film; likewise."""
+    return any(each.thin_film.has("weight") for each in made_of(material, named))
+
+
 def is_participating(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
     """Whether a material, or a part of what it is blended of, scatters light on its way through; likewise."""
     return any(

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
-from clfractal.scene.blends import Blends, blends_of, is_glass, is_participating, is_subsurface
+from clfractal.scene.blends import Blends, blends_of, has_film, is_glass, is_participating, is_subsurface
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
@@ -249,6 +249,13 @@ def has_participating_media(scene: Scene) -> bool:
     """Whether anything that paths go through scatters light on the way."""
     participating = any(is_participating(each, scene.materials) for each in used_materials(scene))
     return has_subsurface(scene) or (has_glass(scene) and participating)
+
+
+def has_films(scene: Scene) -> bool:
+    """Whether anything has a film on it."""
+    return isinstance(scene.lighting, PathLighting) and any(
+        has_film(each, scene.materials) for each in used_materials(scene)
+    )
 
 
 def has_subsurface(scene: Scene) -> bool:

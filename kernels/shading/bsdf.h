@@ -5,20 +5,27 @@
 // sees its coat and fuzz.
 #include "elements/materials"
 
+// A film on the base, as stages include it behind this: `elements/materials/costly/thin_film.h`, or `no_film.h`. It puts it on a base that is
+// ready but for its lobes' probabilities; it says with which probability a boundary is taken to reflect which reflects `share` without it,
+// and what of the body's light comes through.
+INLINE void film_begins(bsdf *b, const pbr *p, __global const float *tables);
+INLINE real film_mirrored(const bsdf *b, real share);
+INLINE color film_passed(const bsdf *b, color body);
+// What it adds to the light of a facet `h` that mirrors `i` to the viewer, and takes from light from beyond. `toward`: the direction, of
+// which `i` is what is not below the surface; `single`: what GGX reflects if facets reflect all, with the factor on highlights, `sharp`.
+INLINE void film_adds(const bsdf *b, vec toward, vec i, vec h, real single, real sharp, __global const float *tables, color *over,
+                      color *below);
+
 INLINE vec bsdf_local(const bsdf *b, vec a) { return vec_of(vec_dot(a, b->side), vec_dot(a, b->up), vec_dot(a, b->normal)); }
 
 // With which probability a facet of glass is taken to reflect.
-INLINE real mirror_share(const bsdf *b, real cosine) {
-    const real reflects = fresnel_across(cosine, b->clear.mirrors);
-    return reflects + (R(1.0) - reflects) * b->more;
-}
+INLINE real mirror_share(const bsdf *b, real cosine) { return film_mirrored(b, fresnel_across(cosine, b->clear.mirrors)); }
 
 // With which probability each lobe is sampled: about by what it reflects.
 INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
     real of_gloss = R(0.0);
     if (any_of(b->dielectric * b->root)) of_gloss = specular_albedo(b, b->out, tables).of_direction;
-    of_gloss += (R(1.0) - of_gloss) * b->more;
-    of_gloss = pick(b->emerges, R(0.0), of_gloss);
+    of_gloss = pick(b->emerges, R(0.0), film_mirrored(b, of_gloss));
     const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
     real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
                            + luminance(b->fuzz);
@@ -42,7 +49,6 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     b.relief = 0;
     b.leans = b.side;
     b.level = R(1.0);
-    b.film.weight = b.more = R(0.0);
     b.out = bsdf_local(&b, to_viewer);
     b.seen = less(R(0.0), b.out.z);
     b.out.z = fmax(b.out.z, R(1e-4));
@@ -54,7 +60,7 @@ INLINE bsdf bsdf_at(const pbr *p, vec normal, vec to_viewer, __global const floa
     below_begins(&b, p, inside);
     coat_covers(&b, p, tables);
     fuzz_covers(&b, tables);
-    if (any_of(p->thin_film_weight)) film_begins(&b, p, tables);
+    film_begins(&b, p, tables);
     bsdf_choices(&b, tables);
     return b;
 }
@@ -88,8 +94,7 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }
         o.of_direction = pick(b->emerges, R(0.0), o.of_direction);
-        body = color_scale(body, b->bare);
-        if (any_of(b->film.weight)) body = color_mul(body, b->film.through);
+        body = film_passed(b, color_scale(body, b->bare));
         sum = color_scale(color_add(color_scale(b->gloss, gloss), color_scale(body, i.z * through_boundary(o, other) * broad)),
                           b->dielectric);
     }
@@ -101,11 +106,7 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
         sum = color_add(sum, color_scale(tint, reflects));
     }
     if (any_of(b->metalness)) sum = color_add(sum, color_scale(metal_value(b, i, h, single, broad, tables), b->metalness));
-    if (any_of(b->film.weight)) {
-        color beyond = none;
-        film_adds(b, &from, &h, single, ggx_value(b->out, i, h, b->facets) * sharp, tables, &sum, &beyond);
-        below = color_add(below, color_pick(under, color_scale(color_mul(beyond, THROUGH_LAYERS(b)), -sharp), none));
-    }
+    film_adds(b, from, i, h, single, sharp, tables, &sum, &below);
     if (any_of(b->coat)) sum = coat_over(b, sum, i, h, broad, sharp);
     if (any_of(brightest(b->fuzz))) sum = fuzz_over(b, sum, i, broad);
     return color_pick(over, sum, below);

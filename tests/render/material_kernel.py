@@ -22,7 +22,7 @@ _TEXT = """\
 #include "structs.h"
 #include "integrators/sampling.h"
 #include "shading/color.h"
-#include "shading/bsdf.h"
+#include "elements/materials/costly/thin_film.h"
 #include "shading/bsdf_bumped.h"
 
 """

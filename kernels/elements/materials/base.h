@@ -24,6 +24,9 @@ INLINE real fresnel_metal(real cosine, real straight, real tint) {
     return metal_reflects(straight, metal_dip(straight, tint), rest5, cosine * rest5 * rest);
 }
 
+// A metal's reflectance straight on for light that meets several facets: with a film on it another one; see bsdf.h.
+INLINE color film_again(const bsdf *b);
+
 // f * cosine of a metal. Of light that is reflected more than once between its facets, `several`, the lobes have a direction: that of wider
 // facets. Their colour is what the first, the last and those between reflect; see `clfractal/shading/facets.py`.
 INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several, __global const float *tables) {
@@ -33,7 +36,7 @@ INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several,
     const real twice = lobe * o.twice * other.twice, more = lobe * o.more * other.more;
     // After more than two facets each time about as much goes on to the next one.
     const real onward = (real)((scalar)REPEATED_AGAIN_TENTHS * S(0.1)) * more / fmax(twice + more, (real)(REAL_SMALLEST));
-    const color again = any_of(b->film.weight) ? b->film.again : b->metal;
+    const color again = film_again(b);
     color sum;
 #define METAL_PART(c)                                                                                                       \
     {                                                                                                                       \

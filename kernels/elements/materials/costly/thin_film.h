@@ -2,8 +2,8 @@
 // even steps of the wavenumber, which are weighed by the colours that they have. The base is a dielectric, or a metal, whose index is the
 // complex one with its reflectance straight on and at 82 degrees. What is added to the light of a bare base is that with the film less
 // that without it, so that a film of no thickness changes nothing.
-#include "base.h"
-#include "transmission.h"
+#include "shading/bsdf.h"
+
 #define FILM_FADES R(8.0)   // micrometres: films with twice this optical path have no colour left, those below all
 
 // An amplitude or a complex index.
@@ -70,10 +70,8 @@ INLINE color film_color(const echo *echoes, int pairs, real path, __global const
 // The root of index^2 - sine^2, which is the index times the cosine within.
 INLINE real index_along(real index, real cosine) { return sqrt(fmax(index * index - R(1.0) + cosine * cosine, R(1e-12))); }
 
-// What a film adds to the light that a dielectric reflects, seen from outside. It is called wherever it is needed: inlined, what few
-// materials have would take registers from all.
-static __attribute__((noinline)) void film_on_dielectric(real film_ior, real thickness, real cosine, real ior, __global const float *tables,
-                                                         color *adds) {
+// What a film adds to the light that a dielectric reflects, seen from outside.
+CALLED void film_on_dielectric(real film_ior, real thickness, real cosine, real ior, __global const float *tables, color *adds) {
     const real c = fmax(cosine, R(1e-4)), within = index_along(film_ior, c), below = index_along(ior, c);
     const wave air = {c, R(0.0)}, level = {within, R(0.0)}, base = {below, R(0.0)};
     const wave level_p = {within / (film_ior * film_ior), R(0.0)}, base_p = {below / (ior * ior), R(0.0)};
@@ -106,8 +104,8 @@ INLINE void index_within(wave n, real cosine, wave *s, wave *p) {
 }
 
 // What a film adds to the light that a metal with these reflectances straight on and these tints at its edges reflects.
-static __attribute__((noinline)) void film_on_metal(real film_ior, real thickness, real cosine, const color *straight, const color *edge,
-                                                    __global const float *tables, color *adds) {
+CALLED void film_on_metal(real film_ior, real thickness, real cosine, const color *straight, const color *edge,
+                          __global const float *tables, color *adds) {
     const real c = fmax(cosine, R(1e-4)), within = index_along(film_ior, c);
     const wave air = {c, R(0.0)}, level = {within, R(0.0)}, level_p = {within / (film_ior * film_ior), R(0.0)};
     const real outer = wave_reflected(air, level).re, outer_p = wave_reflected(air, level_p).re;
@@ -150,8 +148,7 @@ INLINE color film_at_facet(const bsdf *b, real cosine, __global const float *tab
     return color_scale(color_pick(whole, color_of(R(0.0), R(0.0), R(0.0)), adds), b->film.weight);
 }
 
-// Puts the film on a base that is ready but for its lobes' probabilities.
-CALLED void film_begins(bsdf *b, const pbr *p, __global const float *tables) {
+CALLED void film_put_on(bsdf *b, const pbr *p, __global const float *tables) {
     const mask none = b->emerges | less_equal(p->thin_film_thickness, R(0.0));
     b->film.weight = pick(none, R(0.0), p->thin_film_weight);
     b->film.thickness = p->thin_film_thickness;
@@ -178,10 +175,18 @@ CALLED void film_begins(bsdf *b, const pbr *p, __global const float *tables) {
     b->more = clamp(luminance(adds) / passes, R(0.0), R(0.95));
 }
 
-// What it adds to the light of a facet `h` that mirrors `toward` to the viewer, and takes from that of one which bends it from beyond.
-// `single`: what GGX reflects if facets reflect all, with the factor on highlights; `clear`: that of glass.
-CALLED void film_adds(const bsdf *b, const vec *toward, const vec *h, real single, real clear, __global const float *tables, color *over,
-                      color *beyond) {
+INLINE void film_begins(bsdf *b, const pbr *p, __global const float *tables) {
+    b->film.weight = b->more = R(0.0);
+    if (any_of(p->thin_film_weight)) film_put_on(b, p, tables);
+}
+
+INLINE color film_again(const bsdf *b) { return any_of(b->film.weight) ? b->film.again : b->metal; }
+INLINE real film_mirrored(const bsdf *b, real share) { return share + (R(1.0) - share) * b->more; }
+INLINE color film_passed(const bsdf *b, color body) { return any_of(b->film.weight) ? color_mul(body, b->film.through) : body; }
+
+// What it adds at a facet, and takes from that which bends light from beyond; `clear`: what facets of glass reflect if they reflect all.
+CALLED void film_at(const bsdf *b, const vec *toward, const vec *h, real single, real clear, __global const float *tables, color *over,
+                    color *beyond) {
     const real met = vec_dot(b->out, *h);
     if (any_of(b->metalness)) {
         *over = color_add(*over, color_scale(film_at_metal(b, met, tables), b->metalness * single));
@@ -198,4 +203,13 @@ CALLED void film_adds(const bsdf *b, const vec *toward, const vec *h, real singl
     const vec up = vec_of(toward->x, toward->y, fmax(-toward->z, R(1e-6)));
     const real bent = bending_density(g, b->out, *toward, bends) / (R(1.0) + ggx_lambda(up, g->facets));
     *beyond = color_scale(color_mul(g->tint, adds), g->weight * bent);
+}
+
+INLINE void film_adds(const bsdf *b, vec toward, vec i, vec h, real single, real sharp, __global const float *tables, color *over,
+                      color *below) {
+    if (!any_of(b->film.weight)) return;
+    color beyond = color_of(R(0.0), R(0.0), R(0.0));
+    film_at(b, &toward, &h, single, ggx_value(b->out, i, h, b->facets) * sharp, tables, over, &beyond);
+    const color taken = color_scale(color_mul(beyond, THROUGH_LAYERS(b)), -sharp);
+    *below = color_add(*below, color_pick(b->seen & less(toward.z, R(0.0)), taken, color_of(R(0.0), R(0.0), R(0.0))));
 }
