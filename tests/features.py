@@ -39,7 +39,9 @@ _SHAPES = [
 ]
 _GLASS = {
     "lighting": {"mode": "path"},
-    "materials": {"glass": {"transmission": {"weight": 1, "dispersion_scale": 1}}},
+    "materials": {
+        "glass": {"transmission": {"weight": 1, "dispersion_scale": 1}, "thin_film": {"weight": 1}}
+    },
     "material": {"name": "glass"},
 }
 _SKIN = {
