@@ -12,7 +12,8 @@ INLINE int turn_to_meet(object_record o) {
 INLINE real object_met(int i, int turn, vec origin, vec direction, object_record objects, plane_set planes, real *face) {
     real nearest = (real)(REAL_LARGEST);
     *face = R(-1.0);
-    for (int number = 0; number < objects[i].spans; ++number) {
+    const int spans = turn == EQUATION ? 1 : objects[i].spans;
+    for (int number = 0; number < spans; ++number) {
         span s = object_span(objects + i, turn, number, origin, direction);
         real begins = R(-1.0), ends = R(-1.0);
         for (int plane = 0; plane < planes.count; ++plane) {

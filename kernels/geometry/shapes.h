@@ -6,8 +6,9 @@
 //   mask NAME_holds(vec form, vec own)                           whether a place is inside
 //   real NAME_far(vec form, vec own, vec sides, vec *n)          how far the surface is in scene units, below 0 inside, and the direction
 //                                                                away from it, by components as the normal's
-//   enum { NAME_turn = EQUATION }                                and how its span is found: by an EQUATION that is solved at once, or by a
-//                                                                SEARCH in steps, whose registers other shapes do not pay for
+//   enum { NAME_turn = EQUATION }                                and how its span is found: by an EQUATION that is solved at once, of
+//                                                                one part, or by a SEARCH in steps and perhaps of several parts,
+//                                                                whose registers other shapes do not pay for
 // A solid also has a file of `elements/shapes/emitters`, with the functions of `emitter_places.h`.
 
 #include "geometry/spans.h"
