@@ -343,7 +343,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
 _BESIDE = {
     "march_rays": ("look_at_surfaces", "step_rays", "look_where_steps_end"),
     "march_points": ("look_at_points",),
-    "scatter_paths": ("scatter_films",),
+    "scatter_paths": ("scatter_costly",),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }
 _ASK_FORMULA = (
@@ -400,7 +400,7 @@ def stages() -> Drawing:
         sheet.text((left + x + 36, low), told, anchor="lm", size=14)
     told = (
         "where pixels have points march_points marches all rays, and the search by steps is step_rays;"
-        " walk_inside is march_inside of glass that scatters, scatter_films is scatter_paths of thin films"
+        " walk_inside is march_inside of glass that scatters, scatter_costly is scatter_paths with films and tangents"
     )
     sheet.text((left, low + 26), told, PALE, anchor="lm", size=14)
     _queues(sheet, (left, low + 72), width, height)

@@ -214,7 +214,7 @@ PROGRAMS = (
     _Program("air", "integrators/air_rays.cl", ("send_air", "gather_air"), state_defines),
     _Program("materials", "integrators/find_materials.cl", ("find_materials",), state_defines),
     _Program("scatter", "integrators/scatter_paths.cl", ("scatter_paths",), path_defines),
-    _Program("films", "integrators/scatter_films.cl", ("scatter_films",), path_defines),
+    _Program("costly", "integrators/scatter_costly.cl", ("scatter_costly",), path_defines),
     _Program("gather", "integrators/gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
     _Program("media", "integrators/media.cl", ("cross_media", "pass_clouds"), path_defines),
     _Program(

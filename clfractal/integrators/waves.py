@@ -17,8 +17,8 @@ but for the points. With `lighting.mode: path` in the place of the last two
 
 ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
 those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
-`scatter_films` takes the place of `scatter_paths` where materials have films: what is costly is in a stage of its own, so
-that others do not pay for its registers. With media that scatter light `cross_media` stands before both and before
+`scatter_costly` takes the place of `scatter_paths` where materials have parts such as films, whose registers others need
+not pay for. With media that scatter light `cross_media` stands before both and before
 `end_paths`, and with clouds `pass_clouds` after the former. See docs/engineering/stages.md.
 """
 
@@ -41,7 +41,7 @@ from clfractal.shading.maps import (
     MappedMaterials,
     asked_maps,
     bump_numbers,
-    has_films,
+    has_costly,
     has_glass_set,
     has_participating_media,
 )
@@ -255,7 +255,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
                 yield stage("cross_media", 1, bounce=bounce)
             if finds_materials(scene):
                 yield stage("find_materials", bounce=bounce)
-            yield stage("scatter_films" if has_films(scene) else "scatter_paths", 1, bounce=bounce)
+            yield stage("scatter_costly" if has_costly(scene) else "scatter_paths", 1, bounce=bounce)
             if clouds_of(scene):
                 yield stage("pass_clouds", bounce=bounce)
             if scene.cut_planes and bounce == 0:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.materials import PARTS, PbrMaterial
 from clfractal.schema.material import BLACK
 
 
@@ -67,9 +67,14 @@ def is_subsurface(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bo
     return any(each.subsurface.has("weight") for each in made_of(material, named))
 
 
-def has_film(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
-    """Whether a material, or a part of what it is blended of, has a thin film; likewise."""
-    return any(each.thin_film.has("weight") for each in made_of(material, named))
+def is_costly(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:
+    """Whether a material, or a part of what it is blended of, has what most have not and pay nothing for; likewise."""
+    return any(
+        getattr(each, part.tag).has(name)
+        for each in made_of(material, named)
+        for part in PARTS
+        for name in part.costly
+    )
 
 
 def is_participating(material: PbrMaterial, named: Mapping[str, PbrMaterial]) -> bool:

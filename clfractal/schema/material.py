@@ -53,6 +53,8 @@ class Part(Mapped, Element):
 
     zero_if_matt: ClassVar[tuple[str, ...]] = ("weight",)
     """Its fields that are 0 in a material that is a matt body and nothing else."""
+    costly: ClassVar[tuple[str, ...]] = ()
+    """Its fields that ask for a stage of its own where they are above 0: `costly` in its kernel files' folder."""
     at_spots: ClassVar[bool] = True
     """Whether its fields are parameters in each lane."""
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
-from clfractal.scene.blends import Blends, blends_of, has_film, is_glass, is_participating, is_subsurface
+from clfractal.scene.blends import Blends, blends_of, is_costly, is_glass, is_participating, is_subsurface
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.materials import MAX_MATERIALS
 from clfractal.scene.model import Scene
@@ -251,10 +251,10 @@ def has_participating_media(scene: Scene) -> bool:
     return has_subsurface(scene) or (has_glass(scene) and participating)
 
 
-def has_films(scene: Scene) -> bool:
-    """Whether anything has a film on it."""
+def has_costly(scene: Scene) -> bool:
+    """Whether any material has a part that a stage of its own evaluates."""
     return isinstance(scene.lighting, PathLighting) and any(
-        has_film(each, scene.materials) for each in used_materials(scene)
+        is_costly(each, scene.materials) for each in used_materials(scene)
     )
 
 

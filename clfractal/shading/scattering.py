@@ -123,7 +123,7 @@ def drawn_out(scales: Doubles) -> Doubles:
 
 
 def _drawn_widths(roughness: float, anisotropy: float) -> tuple[float, float]:
-    """Along the tangent and across it, as in `kernels/elements/materials/specular.h`."""
+    """Along the tangent and across it, as in `elements/materials/costly/specular.h`."""
     rest, least = 1 - anisotropy, 1 / SMOOTHEST_PARTS
     along = max(roughness * roughness, least) * math.sqrt(2 / (1 + rest * rest))
     return along, max(rest * along, least)

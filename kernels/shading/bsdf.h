@@ -5,7 +5,7 @@
 // sees its coat and fuzz.
 #include "elements/materials"
 
-// A film on the base, as stages include it behind this: `elements/materials/costly/thin_film.h`, or `no_film.h`. It puts it on a base that is
+// A film on the base, as stages include it behind this: `elements/materials/costly`, or `plain_materials.h`. It puts it on a base that is
 // ready but for its lobes' probabilities; it says with which probability a boundary is taken to reflect which reflects `share` without it,
 // and what of the body's light comes through.
 INLINE void film_begins(bsdf *b, const pbr *p, __global const float *tables);

@@ -22,7 +22,8 @@ _TEXT = """\
 #include "structs.h"
 #include "integrators/sampling.h"
 #include "shading/color.h"
-#include "elements/materials/costly/thin_film.h"
+#include "shading/bsdf.h"
+#include "elements/materials/costly"
 #include "shading/bsdf_bumped.h"
 
 """

@@ -58,7 +58,7 @@ SKIN: dict[str, Any] = {"subsurface": {"weight": 1}}
 PATHS = {"lighting": {"mode": "path"}}
 RISES = {"curve": [[0, 0.1], [1, 0.4]]}
 GLOW = {"glow": {"emission": {"luminance": 3}}}
-# The same of scenes along paths. (Where materials have films, paths are scattered by a stage that knows of them.)
+# The same of scenes along paths. (Where materials have costly parts, paths are scattered by a stage that knows of them.)
 FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     "lights": (FEATURES["lights"][0], set()),
     "lights on the set": (FEATURES["lights on the set"][0], set()),
@@ -84,11 +84,11 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     ),
     "tangent": (
         {"materials": {"m": {"specular": {"anisotropy": 0.8}}}, "material": {"name": "m"}},
-        set(),
+        {"costly", "scatter"},
     ),
     "film": (
         {"materials": {"m": {"thin_film": {"weight": 1}}}, "material": {"name": "m"}},
-        {"films", "scatter"},
+        {"costly", "scatter"},
     ),
     "glass": ({"materials": {"m": GLASS}, "material": {"name": "m"}}, {"glass"}),
     "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"random_walk", "media"}),

@@ -15,6 +15,7 @@ class Specular(Part):
 
     tag = "specular"
     place = 20
+    costly = ("anisotropy",)
     weight: FractionMap = Field(1.0, description="factor on the reflectance of a dielectric, straight on")
     color: ReflectanceMap = Field(WHITE, description="a dielectric's tint; a metal's at its edges")
     roughness: FractionMap = Field(0.3, description="0: a mirror, 1: no highlight")
