@@ -1,5 +1,6 @@
 // Entry points: what lights have brought to paths, where these go on, and their ends. They know no formula.
 #include "integrators/path_stages.h"
+#include "shading/plain_materials.h"
 
 #define SOUGHT_BEYOND R(4.0)   // footprints
 

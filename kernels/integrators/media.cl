@@ -1,5 +1,6 @@
 // Entry points: media that scatter light beside the set, which are clouds, milk and what is below boundaries. They know no formula.
 #include "integrators/path_stages.h"
+#include "shading/plain_materials.h"
 #include "shading/participating_media.h"
 #include "geometry/clouds.h"
 

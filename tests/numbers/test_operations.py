@@ -107,7 +107,7 @@ def test_dual(name: str, call: str, precision: Precision) -> None:
 
 @pytest.mark.parametrize("number_type", ["real", "dual"])
 def test_no_operation_is_forgotten(number_type: str) -> None:
-    text = (folder("kernels") / "numbers" / f"{number_type}.h").read_text()
+    text = (folder("kernels") / "formulas/numbers" / f"{number_type}.h").read_text()
     defined = set(re.findall(r"^INLINE \w+ (\w+)\(", text, re.MULTILINE))
     calls = " ".join(call for o in table("float32") for call in (o.real, *o.duals))
     assert len(defined) > 20

@@ -62,7 +62,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
 
-# What none of the pictures has: exact normals of a grid, a grid along paths, and glass that is clear.
+# What none of the pictures has: exact normals of a grid, a grid along paths, glass that is clear, and costly parts of materials.
 _MORE: dict[str, dict[str, Any]] = {
     "exact": {"renderer": {"type": "volume", "normals": "exact"}},
     "lit": {
@@ -76,6 +76,11 @@ _MORE: dict[str, dict[str, Any]] = {
         "lighting": {"mode": "path"},
         "materials": {"clear": {"transmission": {"weight": 1}}},
         "material": {"name": "clear"},
+    },
+    "film": {
+        "lighting": {"mode": "path"},
+        "materials": {"film": {"thin_film": {"weight": 1}, "specular": {"anisotropy": 0.5}}},
+        "material": {"name": "film"},
     },
 }
 
