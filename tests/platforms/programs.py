@@ -62,7 +62,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
 
-# What none of the pictures has: exact normals of a grid, a grid along paths, glass that is clear, and costly parts of materials.
+# What none of the pictures has: exact normals of a grid, a grid along paths, clear glass, and costly parts of materials.
 _MORE: dict[str, dict[str, Any]] = {
     "exact": {"renderer": {"type": "volume", "normals": "exact"}},
     "lit": {
