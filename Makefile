@@ -57,7 +57,7 @@ test: $(VENV)/.tested-with $(STAGE)/.linked
 
 # Light along paths: furnaces, closed forms, Mitsuba 3 beside it. Its truth is in statistics, which take samples.
 light: $(VENV)/.tested-with $(STAGE)/.linked
-	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest tests/render -m "light and not combination" $(PARALLEL) $(ARGUMENTS)
+	cd $(STAGE) && CLFRACTAL_EXPECT_INSTALLED=1 $(BIN)/python -P -m pytest tests/render tests/elements -m "light and not combination" $(PARALLEL) $(ARGUMENTS)
 
 # Every formula, number type, lane count, normal and picture that the usual tests show by examples.
 combinations: $(VENV)/.tested-with $(STAGE)/.linked
