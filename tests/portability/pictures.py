@@ -156,9 +156,10 @@ _TINY = ("mandelbulb", "hast", "mandelbox", "plane")
 FOLDER = Path(__file__).parent
 """Where the grid is that objects show."""
 SIZE, TINY_SIZE = (96, 72), (12, 8)
-# Processes that share a kind's pictures: one for surfaces, which share the programs that know no formula, and one for the
-# others. The simulator's checker of memory takes a second picture's for the first one's.
-PARTS = {"full": 2, "brief": 2, "tiny": 4}
+# Processes that share a kind's pictures: one for surfaces, which share the programs that know no formula, and two for the
+# others, of which Intel's compiler takes minutes. The simulator's checker of memory takes a second picture's for the first
+# one's.
+PARTS = {"full": 3, "brief": 3, "tiny": 4}
 
 
 def cases(kind: str) -> Iterator[tuple[str, Precision]]:
@@ -176,7 +177,9 @@ def cases_of(kind: str, part: int) -> list[tuple[str, Precision]]:
     every = list(cases(kind))
     if kind == "tiny":
         return every[part :: PARTS[kind]]
-    return [each for each in every if ("type:" in _RENDERERS.get(each[0], "")) == bool(part)]
+    surfaces = [each for each in every if "type:" not in _RENDERERS.get(each[0], "")]
+    others = [each for each in every if each not in surfaces]
+    return others[part - 1 :: PARTS[kind] - 1] if part else surfaces
 
 
 def picture(
