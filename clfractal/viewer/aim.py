@@ -11,6 +11,7 @@ from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.rectangle import Plane
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer.picking import Pick
+from clfractal.viewer.pointer import vector
 from clfractal.viewer.sight import sight_in
 
 
@@ -27,7 +28,6 @@ class Aim:
         depth: under the pointer; infinite where nothing is.
         point: in space, under the pointer; None where nothing is.
         view: what the eye between both eyes sees.
-        scale: pixels of the view's picture for a pixel of the window, across and down.
         pivot: what orbits turn about: the point under the pointer, else what is at the picture's middle.
     """
 
@@ -40,7 +40,6 @@ class Aim:
     depth: float
     point: tuple[float, float, float] | None
     view: View
-    scale: tuple[float, float]
     pivot: tuple[float, float, float]
 
     @property
@@ -83,7 +82,6 @@ def aimed(scene: Scene, pick: Pick) -> Aim:
         pick.depth,
         pick.point,
         middle,
-        (1.0, 1.0),
         _pivot(seen, pick),
     )
 
@@ -91,5 +89,4 @@ def aimed(scene: Scene, pick: Pick) -> Aim:
 def _pivot(scene: Scene, pick: Pick) -> tuple[float, float, float]:
     if pick.point is not None or pick.depths is None or isinstance(scene.renderer, CutPlaneRenderer):
         return pick.point or scene.camera.target
-    x, y, z = sight_in(scene, pick.view, pick.depths).pivot().tolist()
-    return x, y, z
+    return vector(sight_in(scene, pick.view, pick.depths).pivot())

@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from clfractal.camera.views import scene_view, seen_by
 from clfractal.device.select import choose, devices
-from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
+from clfractal.errors import STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer import marked_lines as marks
 from clfractal.viewer import window
@@ -23,6 +23,7 @@ from clfractal.viewer.operators import Operators
 from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.panels import all_panels, timeline_area
 from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.preparing import internal_error
 from clfractal.viewer.room import Room
 from clfractal.viewer.screenshots import Drawn
 from clfractal.viewer.settings import Settings
@@ -153,10 +154,8 @@ class Viewer(Workspace):
         if self.ui.settings is self.settings:
             return
         self.set_settings(self.ui.settings)
-        try:
+        with self.studio.telling():
             self.settings.save()
-        except ClfractalError as error:
-            self.studio.tell(str(error), wrong=True)
 
     # The picture
 
@@ -172,9 +171,7 @@ class Viewer(Workspace):
                 filling=self.outputs.filling,
                 shown=self.surface.shown is not None,
             )
-            self._rest(False)
-        else:
-            self._rest(True)
+        self._rest(self.window.minimised)
         self.outputs.watch(now, self.studio.tell)
         self._mind_device()
         self.studio.films.look(now)
@@ -186,18 +183,14 @@ class Viewer(Workspace):
             self._told = told
             self.redraw()
         self.surface.want(self.studio.frame, self.studio.look)
-        shown = self.surface.shown
-        self.motion.depth = self.meter.nearest(shown)
+        self.motion.depth = self.meter.nearest(self.surface.shown)
 
     def _rest(self, hidden: bool) -> None:
         """A window that nobody sees gathers no samples."""
-        session = self.studio.session
         if hidden != self._hidden:
             self._hidden = hidden
-            if hidden and not session.paused:
-                session.pause()
-            elif not hidden:
-                session.pause(False)
+            if self.studio.session.paused != hidden or not hidden:
+                self.studio.session.pause(hidden)
 
     def _mind_comfort(self) -> None:
         """Warns of a pair that strains the eyes, as of one that is written to a file; a shot is of the picture."""
@@ -210,11 +203,9 @@ class Viewer(Workspace):
 
     def _mind_device(self) -> None:
         """A device that fails gives way to another one; the last picture stays until then."""
-        session = self.studio.session
-        problem = session.problem
+        failed, problem = self.studio.session.device.info, self.studio.session.problem
         if not isinstance(problem, DeviceError) or problem.status != STATUS_DEVICE_FAILED:
             return
-        failed = session.device.info
         if isinstance(problem, KernelBuildError) or failed.index in self._failed:
             return
         self._failed.add(failed.index)
@@ -231,9 +222,7 @@ class Viewer(Workspace):
         if places != self.places or not self._panels_may_stay(now):
             self.places = places
             self._build_panels(now)
-        self.outputs.draw(
-            self.surface, self.operators.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
-        )
+        self._draw_outputs()
         self._redraw_while_busy()
         still = self.inputs.played and not self.motion.active
         if self.files.after_draw(Drawn(self.surface.shown, still, self.outputs.read, self.picture_alone)):
@@ -245,10 +234,14 @@ class Viewer(Workspace):
         """The picture that is shown, without what lies over it: uint8 of shape (height, width, 3)."""
         self.outputs.draw(self.surface, False, lambda by: None)
         pixels = self.outputs.read(picture=True)
-        self.outputs.draw(
-            self.surface, self.operators.chart_shown, lambda by: self._draw_ui(by, imgui.get_draw_data())
-        )
+        self._draw_outputs()
         return pixels
+
+    def _draw_outputs(self) -> None:
+        def draw_panels(by: UiRenderer | None) -> None:
+            (by or self.renderer).draw(imgui.get_draw_data(), list(self.places.ui))
+
+        self.outputs.draw(self.surface, self.operators.chart_shown, draw_panels)
 
     def _panels_may_stay(self, now: float) -> bool:
         """Whether the panels of the frame before are shown again, while only the picture moves.
@@ -293,12 +286,9 @@ class Viewer(Workspace):
             imgui.internal.error_recovery_try_to_recover_state(before)
             io.config_error_recovery_enable_assert = asserts
             io.config_error_recovery_enable_debug_log = logs
-            line = f"internal error, please report it: {type(error).__name__}: {error}"
+            line = internal_error(error).message
             if not any(message.text.startswith(line[:60]) for message in self.studio.messages[-5:]):
                 self.studio.tell(line, wrong=True)
-
-    def _draw_ui(self, by: UiRenderer | None, data: Any) -> None:
-        (by or self.renderer).draw(data, list(self.places.ui))
 
     def _draw_marks(self, scale: float) -> None:
         scene = self.studio.shown_scene
@@ -322,11 +312,9 @@ class Viewer(Workspace):
 
     def _redraw_while_busy(self) -> None:
         """A spinner turns while something compiles or is rendered beside the picture."""
-        session = self.studio.session
-        awaited = self.ui.memory.pop(
-            "awaited", False
-        )  # a panel waits for pictures, or for a thread of its own
-        if awaited or session.progress or self.studio.busy_beside:
+        # A panel may wait for pictures, or for a thread of its own.
+        awaited = self.ui.memory.pop("awaited", False)
+        if awaited or self.studio.session.progress or self.studio.busy_beside:
             self._wake_at = time.perf_counter() + 0.1
 
     _wake_at = 0.0
@@ -346,12 +334,9 @@ class Viewer(Workspace):
             wait = self._until_drawn(time.perf_counter())
             if wait <= 0:
                 return 0.0
-        frame = self.player.wait(time.perf_counter())
-        if frame is not None:
-            wait = min(wait, frame)
-        due = self.inputs.next_due
-        if due is not None:
-            wait = min(wait, max(due - time.perf_counter(), 0.0))
+        frame, due = self.player.wait(time.perf_counter()), self.inputs.next_due
+        wait = wait if frame is None else min(wait, frame)
+        wait = wait if due is None else min(wait, max(due - time.perf_counter(), 0.0))
         if self._wake_at:
             left = self._wake_at - time.perf_counter()
             if left <= 0:

@@ -11,7 +11,6 @@ import os
 import secrets
 import sys
 import time
-from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,7 +31,29 @@ from clfractal.viewer.sources import same_file
 _VERSION = 1
 
 
-class Autosave:
+@dataclass
+class _Held:
+    """The files of a window, in a folder, under a name; and their lock, while this process holds it."""
+
+    _folder: Path
+    _name: str
+    _lock: int | None
+
+    def discard(self) -> None:
+        """Removes what was kept, and gives the lock up."""
+        _remove(self._folder, self._name)
+        if self._lock is not None:
+            _end_lock(self._lock, self._folder / f"{self._name}.lock")
+            self._lock = None
+
+    def release(self) -> None:
+        """Leaves what was kept for the next window."""
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+class Autosave(_Held):
     """The unsaved changes of one window; a context manager that leaves nothing behind when it is left without error.
 
     A disk that is full or cannot be written is no reason to end: the work is then not kept, and `write` returns False.
@@ -40,9 +61,7 @@ class Autosave:
 
     def __init__(self, folder: Path | None = None) -> None:
         """Args: folder: by default `autosave` in the user's cache folder."""
-        self._folder = folder if folder is not None else default_folder()
-        self._name = f"{os.getpid()}-{secrets.token_hex(4)}"
-        self._lock: int | None = None
+        super().__init__(folder or default_folder(), f"{os.getpid()}-{secrets.token_hex(4)}", None)
         self._written: str | None = None
 
     def __enter__(self) -> Self:
@@ -90,16 +109,8 @@ class Autosave:
 
     def close(self) -> None:
         """The same, when the window closes."""
-        self.clear()
-        if self._lock is not None:
-            _end_lock(self._lock, self._folder / f"{self._name}.lock")
-            self._lock = None
-
-    def release(self) -> None:
-        """Leaves what was kept for the next window."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self.discard()
+        self._written = None
 
     def found(self, of: Path | None = None) -> list[Recovered]:
         """What windows that have ended left behind, the newest first; damaged files are removed.
@@ -118,19 +129,18 @@ class Autosave:
             if path.stem == self._name or (lock := _taken(path)) is None:
                 continue
             recovered = _read(self._folder, path.stem, lock)
-            if recovered is not None and of is not None and not _came_from(recovered, of):
-                recovered.release()
-            elif recovered is None:
-                _remove(self._folder, path.stem)
-                _end_lock(lock, path)
-            else:
+            if recovered is None:
+                _Held(self._folder, path.stem, lock).discard()
+            elif of is None or (recovered.path is not None and same_file(recovered.path, of)):
                 found.append(recovered)
+            else:
+                recovered.release()
         return sorted(found, key=lambda each: each.time, reverse=True)
 
 
 @dataclass
-class Recovered:
-    """Unsaved changes of a window that has ended.
+class Recovered(_Held):
+    """Unsaved changes of a window that has ended; they are kept by this one once they are discarded here.
 
     Attributes:
         time: when they were kept, seconds since 1970.
@@ -143,9 +153,6 @@ class Recovered:
     path: Path | None
     folder: Path
     text: str
-    _store: Path
-    _name: str
-    _lock: int | None
 
     def scene(self) -> Scene:
         """The scene with the changes.
@@ -163,19 +170,6 @@ class Recovered:
                 return open_source(self.path)
         return SceneSource("none", None, self.text, self.scene())
 
-    def discard(self) -> None:
-        """Removes them: they have been given up, or are kept by this window now."""
-        _remove(self._store, self._name)
-        if self._lock is not None:
-            _end_lock(self._lock, self._store / f"{self._name}.lock")
-            self._lock = None
-
-    def release(self) -> None:
-        """Leaves them for the next window."""
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
-
 
 def default_folder() -> Path:
     """`autosave` in the user's cache folder."""
@@ -191,22 +185,10 @@ def _read(folder: Path, name: str, lock: int) -> Recovered | None:
             return None
         if not isinstance(read_document(text).root.value, dict):
             return None
-        path = note["path"]
-        return Recovered(
-            float(note["time"]),
-            Path(path) if path is not None else None,
-            Path(note["folder"]),
-            text,
-            folder,
-            name,
-            lock,
-        )
+        path = Path(note["path"]) if note["path"] is not None else None
+        return Recovered(folder, name, lock, float(note["time"]), path, Path(note["folder"]), text)
     except (ClfractalError, ValueError, TypeError, KeyError):
         return None
-
-
-def _came_from(recovered: Recovered, path: Path) -> bool:
-    return recovered.path is not None and same_file(recovered.path, path)
 
 
 def _locked_file(path: Path) -> int:
@@ -293,12 +275,6 @@ def _replace(path: Path, text: str) -> None:
 
 
 def _remove(folder: Path, name: str) -> None:
-    for path in _files(folder, name):
+    for file in (f"{name}.json", f"{name}.yaml", f".{name}.json.new", f".{name}.yaml.new"):
         with suppress(OSError):
-            path.unlink()
-
-
-def _files(folder: Path, name: str) -> Iterator[Path]:
-    for ending in (".json", ".yaml"):
-        yield folder / f"{name}{ending}"
-        yield folder / f".{name}{ending}.new"
+            (folder / file).unlink()

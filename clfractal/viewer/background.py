@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -92,7 +93,47 @@ def prepared(
     return prepare(scene, executor.device, channels=channels, on_start=tell)
 
 
-class Thumbnail:
+class _Picture:
+    """A picture that is rendered bit by bit, whenever the window's own leaves time; see `Task`.
+
+    Attributes:
+        problem: why there is none, or empty.
+        cancelled: whether it is not needed any more.
+    """
+
+    def __init__(self) -> None:
+        self.problem = ""
+        self.cancelled = False
+        self._framebuffers: JobFramebuffers | None = None
+        self._token: CancelToken | None = None
+
+    def cancel(self) -> None:
+        """It is not needed any more."""
+        self.cancelled = True
+        token = self._token
+        if token is not None:
+            token.cancel()
+
+    def _rendered(
+        self,
+        executor: LocalExecutor,
+        token: CancelToken,
+        job: Callable[[], Job],
+        progress: Callable[[Progress], None] | None = None,
+    ) -> JobFramebuffers | None:
+        """The whole picture of a job, which is made anew for another device; None if it was cancelled."""
+        self._token = token
+        if self.cancelled:
+            return None
+        if self._framebuffers is None or self._framebuffers.job.device != executor.device.info:
+            self._framebuffers = JobFramebuffers(job())
+        found = self._framebuffers
+        run(found.job, found.framebuffers, executor, token=token, progress=progress)
+        self._framebuffers = self._token = None
+        return found
+
+
+class Thumbnail(_Picture):
     """A small picture of a scene, 8-bit RGBA.
 
     Args:
@@ -102,28 +143,18 @@ class Thumbnail:
 
     Attributes:
         pixels: shape (height, width, 4), when it is finished.
-        problem: why there is none.
     """
 
     def __init__(self, load: Callable[[], Scene], size: tuple[int, int], samples: int = 1) -> None:
+        super().__init__()
         self._load, self.size, self.samples = load, size, samples
         self.pixels: Pixels | None = None
         self.framebuffer: Framebuffer | None = None
-        self.problem = ""
-        self._framebuffers: JobFramebuffers | None = None
-        self._token: CancelToken | None = None
-        self._cancelled = False
 
     @property
     def finished(self) -> bool:
         """See `Task`."""
-        return self.pixels is not None or bool(self.problem) or self._cancelled
-
-    def cancel(self) -> None:
-        """It is not needed any more."""
-        self._cancelled = True
-        if self._token is not None:
-            self._token.cancel()
+        return self.pixels is not None or bool(self.problem) or self.cancelled
 
     def failed(self, error: ClfractalError) -> None:
         """See `Task`."""
@@ -131,19 +162,12 @@ class Thumbnail:
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `Task`."""
-        self._token = token
-        if self._cancelled:
-            return
-        if self._framebuffers is None or self._framebuffers.job.device != executor.device.info:
-            self._framebuffers = JobFramebuffers(prepared(self._scene(), executor, token, tell, colors=True))
-        run(self._framebuffers.job, self._framebuffers.framebuffers, executor, token=token)
-        framebuffer = self._framebuffers.picture()
-        self._token = None
-        colors = rgb8(framebuffer, self._framebuffers.development)
-        opaque = np.full((*colors.shape[:2], 1), 255, np.uint8)
-        self.framebuffer = framebuffer
-        self._framebuffers = None
-        self.pixels = np.concatenate([colors, opaque], axis=-1)
+        found = self._rendered(
+            executor, token, lambda: prepared(self._scene(), executor, token, tell, colors=True)
+        )
+        if found is not None:
+            self.framebuffer = found.picture()
+            self.pixels = opaque(rgb8(self.framebuffer, found.development))
 
     def _scene(self) -> Scene:
         scene = self._load()
@@ -154,12 +178,16 @@ class Thumbnail:
         return scene.model_copy(update={"image": image, "renderer": renderer, "stereo": None})
 
 
-class Still:
+def opaque(colors: Pixels) -> Pixels:
+    """8-bit colours, shape (height, width, 3), with an opaque fourth channel."""
+    return np.concatenate([colors, np.full((*colors.shape[:2], 1), 255, np.uint8)], axis=-1)
+
+
+class Still(_Picture):
     """A picture of any size, rendered in the background and written to files.
 
     Attributes:
         share: how much of it is done, 0 to 1.
-        problem: why it failed, or empty.
         written: the files, when it is done.
     """
 
@@ -171,78 +199,56 @@ class Still:
         *,
         exposed_in: Scene | None = None,
     ) -> None:
+        super().__init__()
         self.scene, self.paths, self._exposed_in = scene, paths, exposed_in
         self.share = 0.0
-        self.problem = ""
         self.written: tuple[Path, ...] = ()
         self.remaining: float | None = None
         self._header = header or {}
-        self._framebuffers: JobFramebuffers | None = None
-        self._token: CancelToken | None = None
-        self._writing = False
         self._writer: threading.Thread | None = None
-        self._cancelled = threading.Event()
 
     @property
     def finished(self) -> bool:
         """See `Task`."""
-        return bool(self.written) or bool(self.problem) or self._cancelled.is_set()
+        return bool(self.written) or bool(self.problem) or self.cancelled
 
     def cancel(self) -> None:
         """Ends it; nothing is written, unless its files are being written already."""
-        if self._writing:
-            return
-        self._cancelled.set()
-        token = self._token
-        if token is not None:
-            token.cancel()
+        if self._writer is None:
+            super().cancel()
 
     def finish_writing(self) -> None:
         """Waits until its files are complete, if they are being written; a process must not end before."""
         if self._writer is not None:
             self._writer.join()
 
-    @property
-    def cancelled(self) -> bool:
-        """Whether it was cancelled."""
-        return self._cancelled.is_set()
-
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `Task`."""
-        self._token = token
-        if self.cancelled:
-            return
-        if self._framebuffers is None or self._framebuffers.job.device != executor.device.info:
-            self._framebuffers = JobFramebuffers(
-                prepared(self.scene, executor, token, tell, colors=False, exposed_in=self._exposed_in)
-            )
-        framebuffers = self._framebuffers
-        run(framebuffers.job, framebuffers.framebuffers, executor, token=token, progress=self._told)
-        self._framebuffers = self._token = None
-        self._writing = True
-        # The device is free for the next picture meanwhile.
-        self._writer = threading.Thread(
-            target=self._write, args=(framebuffers,), name="clfractal-still", daemon=True
+        found = self._rendered(
+            executor,
+            token,
+            lambda: prepared(self.scene, executor, token, tell, colors=False, exposed_in=self._exposed_in),
+            self._told,
         )
-        self._writer.start()
+        if found is not None:
+            # The device is free for the next picture meanwhile.
+            write, name = partial(self._write, found), "clfractal-still"
+            self._writer = threading.Thread(target=write, name=name, daemon=True)
+            self._writer.start()
 
     def failed(self, error: ClfractalError) -> None:
         """See `Task`."""
         self.problem = str(error)
 
     def _write(self, framebuffers: JobFramebuffers) -> None:
+        job, header = framebuffers.job, {**framebuffers.job.header(), **self._header}
         try:
-            save_job(
-                framebuffers.job,
-                framebuffers.framebuffers,
-                self.paths,
-                {**framebuffers.job.header(), **self._header},
-            )
+            save_job(job, framebuffers.framebuffers, self.paths, header)
             self.written = self.paths
         except ClfractalError as error:
             self.failed(error)
         except Exception as error:  # a panel shows it
-            self.problem = f"internal error, please report it: {type(error).__name__}: {error}"
+            self.failed(internal_error(error))
 
     def _told(self, state: Progress) -> None:
         self.share = state.tiles_done / max(state.tiles, 1)

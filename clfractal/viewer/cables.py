@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from clfractal.viewer import window
 from clfractal.viewer.window import Monitor, Window
@@ -11,8 +11,7 @@ from clfractal.viewer.window import Monitor, Window
 _SECONDS = 1.0
 
 
-@dataclass(frozen=True, slots=True)
-class Told:
+class Told(NamedTuple):
     """A line about a monitor, and whether it is bad news."""
 
     text: str
@@ -49,11 +48,9 @@ class Cables:
         if not self._filled or now - self._looked < _SECONDS:
             return [], []
         self._looked = now
-        before, self._there = self._there, self._ask()
-        if before == self._there:
-            return [], []
         told: list[Told] = []
         again: list[tuple[Window, list[Monitor]]] = []
+        before, self._there = self._there, self._ask()
         for (where, wanted), old, new in zip(
             self._filled, self._found(before), self._found(self._there), strict=True
         ):
@@ -70,18 +67,13 @@ class Cables:
 
     def has(self, where: Window) -> bool:
         """Whether all monitors of a window are there; also if it fills none."""
-        found = self._found(self._there)
-        return all(
-            each is not None
-            for (filled, _), theirs in zip(self._filled, found, strict=True)
-            if filled is where
-            for each in theirs
-        )
+        places = zip(self._filled, self._found(self._there), strict=True)
+        return all(None not in theirs for (filled, _), theirs in places if filled is where)
 
     @property
     def complete(self) -> bool:
         """Whether all monitors are there that windows fill."""
-        return all(each is not None for theirs in self._found(self._there) for each in theirs)
+        return all(None not in theirs for theirs in self._found(self._there))
 
     def _found(self, there: Sequence[Monitor]) -> list[list[Monitor | None]]:
         """The monitors of each window as they are now, by their names; of several with one name first those in place."""
@@ -90,15 +82,11 @@ class Cables:
         left = list(there)
         for at_its_place in (True, False):
             for number, each in enumerate(wanted):
-                same = (
-                    other
-                    for other in left
-                    if other.name == each.name
-                    and (not at_its_place or (other.x, other.y) == (each.x, each.y))
-                )
-                now = next(same, None) if number not in found else None
-                if now is not None:
-                    found[number] = now
-                    left.remove(now)
+                same = [other for other in left if other.name == each.name]
+                if at_its_place:
+                    same = [other for other in same if (other.x, other.y) == (each.x, each.y)]
+                if same and number not in found:
+                    found[number] = same[0]
+                    left.remove(same[0])
         numbers = iter(range(len(wanted)))
         return [[found.get(next(numbers)) for _ in theirs] for _, theirs in self._filled]

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping
+from functools import reduce
 from typing import Any, TypeAlias
 
 from clfractal.files.fragments import same
 from clfractal.scene.camera_base import CameraBase
+from clfractal.viewer.editing import child
 
 WORDS = tuple(name for name, field in CameraBase.model_fields.items() if field.exclude)
 
@@ -59,14 +61,7 @@ def _place(camera: Any) -> list[Any]:
 
 
 def _at(data: Any, path: Path) -> Any:
-    for part in path:
-        if isinstance(data, list) and isinstance(part, int) and part < len(data):
-            data = data[part]
-        elif isinstance(data, Mapping):
-            data = data.get(part)
-        else:
-            return None
-    return data
+    return reduce(child, map(str, path), data)
 
 
 def _merged(data: Any, path: Path, more: Mapping[str, Any]) -> Any:

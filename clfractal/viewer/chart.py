@@ -92,12 +92,15 @@ def _blend(gray: Floats, covered: Floats, value: float) -> None:
 
 def _grid(gray: Floats) -> None:
     height, width = gray.shape
-    cell = grid_cell((width, height))
-    for length, axis in ((width, 0), (height, 1)):
-        along = _axis(length)
-        off = along - cell * np.rint(along / cell)
-        covered = _line(off.astype(np.float32), _unit((width, height)))
-        _blend(gray, covered[None, :] if axis == 0 else covered[:, None], _GRID)
+    cell, unit = grid_cell((width, height)), _unit((width, height))
+    _blend(gray, _ticks(_axis(width), cell, unit)[None, :], _GRID)
+    _blend(gray, _ticks(_axis(height), cell, unit)[:, None], _GRID)
+
+
+def _ticks(along: Floats, step: int, width: float) -> Floats:
+    """Lines at equal distances from the middle."""
+    off = along - step * np.rint(along / step)
+    return _line(off.astype(np.float32), width)
 
 
 def circles(size: tuple[int, int]) -> list[tuple[float, float, float]]:
@@ -147,9 +150,7 @@ def _ruler(gray: Floats) -> None:
     along, down = _axis(width), np.abs(_axis(height))
     reach = _ruler_reach((width, height))
     for every, high in ((10, 5), (50, 9), (100, 14)):
-        step = every * unit
-        off = along - step * np.rint(along / step)
-        ticks = _line(off.astype(np.float32), unit) * (np.abs(along) <= reach)
+        ticks = _ticks(along, every * unit, unit) * (np.abs(along) <= reach)
         rows = np.flatnonzero(down <= high * unit)
         _blend(gray[rows[0] : rows[-1] + 1], ticks[None, :], _WHITE)
 
@@ -219,9 +220,7 @@ def _font(high: int) -> Any:
     from PIL import ImageFont
 
     file = _font_file()
-    if file is not None:
-        return ImageFont.truetype(str(file), high)
-    return ImageFont.load_default(high)
+    return ImageFont.truetype(str(file), high) if file is not None else ImageFont.load_default(high)
 
 
 def _write(picture: Pixels, text: str, box: Box, high: int, value: int = 255) -> None:
@@ -229,12 +228,11 @@ def _write(picture: Pixels, text: str, box: Box, high: int, value: int = 255) ->
     from PIL import Image, ImageDraw
 
     left, top, right, bottom = box
-    drawn = Image.new("L", (right - left, bottom - top))
-    place = ((right - left) / 2, (bottom - top) / 2)
-    font = _font(high)
+    drawn, font = Image.new("L", (right - left, bottom - top)), _font(high)
     draw = ImageDraw.Draw(drawn)
     x0, y0, x1, y1 = draw.textbbox((0, 0), text, font=font)
-    draw.text((place[0] - (x0 + x1) / 2, place[1] - (y0 + y1) / 2), text, fill=255, font=font)
+    place = ((right - left - x0 - x1) / 2, (bottom - top - y0 - y1) / 2)
+    draw.text(place, text, fill=255, font=font)
     covered = np.asarray(drawn, np.float32)[..., None] / 255
     part = picture[top:bottom, left:right, :3]
     part[:] = np.rint(part + covered * (np.float32(value) - part))
@@ -245,9 +243,9 @@ def _label(picture: Pixels) -> None:
     size = (picture.shape[1], picture.shape[0])
     cell, unit = grid_cell(size), _unit(size)
     top = bars_box(size)[1] - cell
-    _on_ground(
-        picture, f"{size[0]} x {size[1]}", _centred(size, 5 * cell, cell * 3 // 4, top), max(9, cell // 2)
-    )
+    box = _centred(size, 5 * cell, cell * 3 // 4, top)
+    picture[box[1] : box[3], box[0] : box[2], :3] = int(_GROUND)
+    _write(picture, f"{size[0]} x {size[1]}", box, max(9, cell // 2))
     high = max(8, 11 * unit)
     top = size[1] // 2 + 17 * unit
     for pixels in range(100, _ruler_reach(size) // unit + 1, 100):
@@ -255,11 +253,6 @@ def _label(picture: Pixels) -> None:
             middle = size[0] // 2 + sign * pixels * unit
             box = (middle - 2 * high, top, middle + 2 * high, top + high + 2)
             _write(picture, f"{sign * pixels * unit:+d}", box, high, int(_LINE))
-
-
-def _on_ground(picture: Pixels, text: str, box: Box, high: int) -> None:
-    picture[box[1] : box[3], box[0] : box[2], :3] = int(_GROUND)
-    _write(picture, text, box, high)
 
 
 def _corner(size: tuple[int, int], eye: Eye) -> Box:

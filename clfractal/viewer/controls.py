@@ -5,13 +5,16 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from clfractal.images.modes import eye_at
 from clfractal.scene.parts import OrthographicCamera
+from clfractal.scene.rectangle import Plane
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import handles, navigation, plane_moves, zoom_box
 from clfractal.viewer.aim import Aim
+from clfractal.viewer.editing import plain
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
@@ -100,20 +103,16 @@ class Controls:
     def move(self, place: Place) -> None:
         """The pointer moves."""
         drag = self._drag
-        if drag is None:
-            return
-        if drag.moved or math.dist(place, drag.start) >= 2:
+        if drag is not None and (drag.moved or math.dist(place, drag.start) >= 2):
             drag.moved = True
             drag.move(drag, place[0] - drag.start[0], place[1] - drag.start[1])
 
     def release(self, place: Place) -> None:
         """The button goes up."""
         drag, self._drag = self._drag, None
-        if drag is None:
-            return
-        if drag.kind == "region":
+        if drag is not None and drag.kind == "region":
             self._end_region(place)
-        elif drag.moved:
+        elif drag is not None and drag.moved:
             self.studio.end_gesture()
 
     def cancel(self) -> bool:
@@ -131,8 +130,7 @@ class Controls:
         factor = _WHEEL ** (steps * (0.25 if mods & SHIFT else 1.0))
         self._wheeled = now
         if self.marking and self.box is not None:
-            stage = zoom_box.stage_of(self.studio.scene)
-            self.box = zoom_box.scaled(self.box, stage, factor)
+            self.box = zoom_box.scaled(self.box, zoom_box.stage_of(self.studio.scene), factor)
         elif aim.plane is not None:
             self._set_plane(aim, plane_moves.zoom_to(aim.plane, aim.x, aim.y, aim.size, factor), "wheel")
         else:
@@ -189,8 +187,7 @@ class Controls:
         renderer = self.studio.scene.renderer
         if self.box is None or not isinstance(renderer, VolumeRenderer):
             return
-        zooms = zoom_box.applied(renderer, self.box)
-        if self.studio.edit({"renderer.zoom": [each.model_dump(mode="json") for each in zooms]}):
+        if self.studio.edit({"renderer.zoom": plain(zoom_box.applied(renderer, self.box))}):
             self.box = zoom_box.first_box(zoom_box.stage_of(self.studio.scene))
 
     def step_back(self) -> None:
@@ -199,7 +196,7 @@ class Controls:
         if not isinstance(renderer, VolumeRenderer) or not renderer.zoom:
             return
         zooms, box = zoom_box.stepped_back(renderer)
-        if self.studio.edit({"renderer.zoom": [each.model_dump(mode="json") for each in zooms]}):
+        if self.studio.edit({"renderer.zoom": plain(zooms)}):
             self.box = box
 
     def _begin(self, button: int, mods: int, place: Place, aim: Aim) -> Drag | None:
@@ -211,19 +208,22 @@ class Controls:
                 return None
             return Drag("light", aim, place, self._move_light, (number, aim.scene.lights[number]))
         if aim.plane is not None:
-            move = {LEFT: self._pan_plane, MIDDLE: self._tilt_plane, RIGHT: self._spin_plane}.get(button)
-            return Drag("plane", aim, place, move, aim.plane) if move is not None else None
+            moves: dict[int, Callable[..., Plane]] = {
+                LEFT: plane_moves.pan,
+                MIDDLE: plane_moves.tilt,
+                RIGHT: plane_moves.spin,
+            }
+            move = moves.get(button)
+            return Drag("plane", aim, place, partial(self._move_plane, move), aim.plane) if move else None
         if button == LEFT:
             return Drag("orbit", aim, place, self._orbit, aim.camera)
         return Drag("pan", aim, place, self._pan, aim.camera)
 
     def _orbit(self, drag: Drag, dx: float, dy: float) -> None:
-        aim, faster = drag.aim, self.settings.mouse
+        aim, way = drag.aim, (dx * self.settings.mouse, dy * self.settings.mouse)
         style = self.settings.orbit
         vertical = self.studio.saved.camera.up if style == "turntable" else None
-        camera = navigation.orbit(
-            drag.before, aim.pivot, dx * faster, dy * faster, aim.size, style, vertical=vertical
-        )
+        camera = navigation.orbit(drag.before, aim.pivot, *way, aim.size, style, vertical=vertical)
         self._set_camera(aim, camera, "orbit")
 
     def _pan(self, drag: Drag, dx: float, dy: float) -> None:
@@ -235,16 +235,12 @@ class Controls:
         stage = zoom_box.stage_of(self.studio.scene)
         self.box = zoom_box.dragged(drag.before, stage, drag.aim.view, drag.aim.size, dx, dy)
 
-    def _pan_plane(self, drag: Drag, dx: float, dy: float) -> None:
-        self._set_plane(drag.aim, plane_moves.pan(drag.before, dx, dy, drag.aim.size), "plane")
-
-    def _tilt_plane(self, drag: Drag, dx: float, dy: float) -> None:
-        self._set_plane(drag.aim, plane_moves.tilt(drag.before, dx, dy, drag.aim.size), "plane")
-
-    def _spin_plane(self, drag: Drag, dx: float, dy: float) -> None:
-        aim = drag.aim
-        start, end = (aim.x, aim.y), (aim.x + dx, aim.y + dy)
-        self._set_plane(aim, plane_moves.spin(drag.before, start, end, aim.size), "plane")
+    def _move_plane(self, move: Callable[..., Plane], drag: Drag, dx: float, dy: float) -> None:
+        if move is plane_moves.spin:
+            start, end = (drag.aim.x, drag.aim.y), (drag.aim.x + dx, drag.aim.y + dy)
+            self._set_plane(drag.aim, plane_moves.spin(drag.before, start, end, drag.aim.size), "plane")
+        else:
+            self._set_plane(drag.aim, move(drag.before, dx, dy, drag.aim.size), "plane")
 
     def _move_light(self, drag: Drag, dx: float, dy: float) -> None:
         aim, (number, light) = drag.aim, drag.before
@@ -260,11 +256,9 @@ class Controls:
         for number, light in enumerate(aim.scene.lights):
             place = handles.handle_position(light, aim.view, aim.size, aim.scene.bounds)
             if place is not None:
-                found.append((math.dist(place[:2], (aim.x, aim.y)), number))
-        near = [each for each in found if each[0] <= _REACH]
-        if near:
-            return min(near)[1]
-        return found[0][1] if found else None
+                found.append((math.dist(place, (aim.x, aim.y)), number))
+        near = min(found, default=(math.inf, None))
+        return near[1] if near[0] <= _REACH or not found else found[0][1]
 
     def _draw_region(self, drag: Drag, dx: float, dy: float) -> None:
         self.region_now = (drag.start[0] + dx, drag.start[1] + dy)
@@ -274,13 +268,13 @@ class Controls:
         if start is None:
             return
         image = self.studio.shown_scene.image
-        width, height = image.width, image.height
-        stereo = self.studio.screens(self.studio.scene.stereo)
-        _, *first = eye_at(stereo, (width, height), *start)
-        _, *second = eye_at(stereo, (width, height), *place)
-        left, right = sorted((min(max(first[0], 0), width), min(max(second[0], 0), width)))
-        top, bottom = sorted((min(max(first[1], 0), height), min(max(second[1], 0), height)))
-        region = (int(left), int(top), int(right) - int(left), int(bottom) - int(top))
+        size, stereo = (image.width, image.height), self.studio.screens(self.studio.scene.stereo)
+        corners = [eye_at(stereo, size, *corner)[1:] for corner in (start, place)]
+        (left, right), (top, bottom) = (
+            sorted(int(min(max(each, 0), most)) for each in ends)
+            for ends, most in zip(zip(*corners, strict=True), size, strict=True)
+        )
+        region = (left, top, right - left, bottom - top)
         self.studio.set_region(region if min(region[2:]) >= 4 else None)
 
     def _is_double(self, place: Place, now: float) -> bool:

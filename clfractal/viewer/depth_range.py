@@ -35,10 +35,8 @@ class DepthRange:
         self.comfort = _measured(shown)
         if self.comfort is None or self.comfort.worst_degrees <= _GOOD:
             self._warned = False
-        warning = self.comfort.warning() if self.comfort is not None else ""
-        if not warning or self._warned:
-            return ""
-        self._warned = True
+        warning = self.comfort.warning() if self.comfort is not None and not self._warned else ""
+        self._warned = self._warned or bool(warning)
         return warning
 
 

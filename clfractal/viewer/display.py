@@ -14,9 +14,10 @@ import pyopencl as cl
 from clfractal.device.gl_sharing import SharedTexture
 from clfractal.device.select import Device
 from clfractal.engine.show import Look, Shower
-from clfractal.errors import ClfractalError, DeviceError
+from clfractal.errors import ClfractalError
 from clfractal.images.tiled import Floats
 from clfractal.viewer.frame import CanvasPool, Frame
+from clfractal.viewer.preparing import internal_error
 
 
 class Target(Protocol):
@@ -220,8 +221,7 @@ class Display:
                         self._spare.append(self._shown.target)
                     self._shown = shown
             except Exception as error:  # the next frame is shown again
-                told = f"internal error, please report it: {type(error).__name__}: {error}"
-                self.problem = error if isinstance(error, ClfractalError) else DeviceError(told)
+                self.problem = error if isinstance(error, ClfractalError) else internal_error(error)
                 with self._changed:
                     self._spare.append(order.target)
             finally:

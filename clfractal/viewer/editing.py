@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
+from functools import reduce
 from typing import Any
 
 from clfractal.errors import SceneError, Where
@@ -15,18 +15,16 @@ from clfractal.viewer.tracked import check_tracked
 
 def plain_section(scene: Scene, key: str) -> Any:
     """A section (or another top-level value) of a scene as plain data."""
-    value = getattr(scene, key)
-    if key == "formula":
-        return value.mapping()
-    if isinstance(value, tuple):
-        return [_plain(each) for each in value]
-    if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
-    return _plain(value)
+    return scene.formula.mapping() if key == "formula" else plain(getattr(scene, key))
 
 
-def _plain(value: Any) -> Any:
-    return value.model_dump(mode="json") if hasattr(value, "model_dump") else value
+def plain(value: Any) -> Any:
+    """A value of a scene as plain data: lists, mappings, numbers, words."""
+    if isinstance(value, Section):
+        return value.model_dump(mode="json")
+    if isinstance(value, (tuple, list)):
+        return [plain(each) for each in value]
+    return {name: plain(each) for name, each in value.items()} if isinstance(value, dict) else value
 
 
 def value_at(scene: Scene, path: str) -> Any:
@@ -34,15 +32,16 @@ def value_at(scene: Scene, path: str) -> Any:
     first, *parts = path.split(".")
     if first not in Scene.model_fields:
         return None
-    value = plain_section(scene, first)
-    for part in parts:
-        if isinstance(value, list) and part.isdecimal() and int(part) < len(value):
-            value = value[int(part)]
-        elif isinstance(value, dict):
-            value = value.get(part)
-        else:
-            return None
-    return value
+    return reduce(child, parts, plain_section(scene, first))
+
+
+def child(holder: Any, name: str) -> Any:
+    """What a section, a mapping or a list has under a name or number; None if there is nothing."""
+    if isinstance(holder, Section):
+        return getattr(holder, name, None)
+    if isinstance(holder, (tuple, list)):
+        return holder[int(name)] if name.isdecimal() and int(name) < len(holder) else None
+    return holder.get(name) if isinstance(holder, Mapping) else None
 
 
 def edited(scene: Scene, values: Mapping[str, Any]) -> Scene:
@@ -104,40 +103,3 @@ def _keys(section: Section) -> dict[str, Any]:
         for name, field in type(section).model_fields.items()
         if not field.exclude
     }
-
-
-@cache
-def _defaults() -> dict[str, Any]:
-    least = {"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}}
-    return Scene.model_validate(least).model_dump(mode="json")
-
-
-def differing(scene: Scene, *, keys: tuple[str, ...] | None = None) -> dict[str, tuple[Any, Any]]:
-    """What differs from the defaults: dotted path -> (value, default).
-
-    Args:
-        keys: the sections to look at; None: all but the version and bookmarks.
-    """
-    defaults = _defaults()
-    found: dict[str, tuple[Any, Any]] = {}
-    for key in keys if keys is not None else tuple(Scene.model_fields):
-        if key in ("version", "bookmarks"):
-            continue
-        before = {"iterations": 30} if key == "formula" else defaults[key]
-        _differences(key, plain_section(scene, key), before, found)
-    return found
-
-
-def _differences(path: str, now: Any, before: Any, found: dict[str, tuple[Any, Any]]) -> None:
-    if isinstance(now, dict) and isinstance(before, dict):
-        for name, value in now.items():
-            _differences(f"{path}.{name}", value, before.get(name), found)
-    elif isinstance(now, list) and isinstance(before, list) and len(now) == len(before):
-        if all(not isinstance(each, (dict, list)) for each in now):
-            if now != before:
-                found[path] = (now, before)
-            return
-        for number, (value, other) in enumerate(zip(now, before, strict=True)):
-            _differences(f"{path}.{number}", value, other, found)
-    elif now != before:
-        found[path] = (now, before)

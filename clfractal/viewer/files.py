@@ -87,8 +87,7 @@ class Files:
     def _again(self, path: Path, source: SceneSource) -> Scene:
         """The scene of a file that was read; of the command line's one with the values from there."""
         scene = loaded_again(path, source, self._overrides)
-        stereo = self._stereo
-        return scene if stereo is None else _with_stereo(scene, stereo)
+        return scene if self._stereo is None else _with_stereo(scene, self._stereo)
 
     def attach(
         self, studio: Studio, outputs: Outputs, parts: set[str], set_title: Callable[[str], None]
@@ -158,8 +157,7 @@ class Files:
 
     def recover(self, found: Recovered) -> None:
         """Goes on with unsaved changes of a window that ended."""
-        scene = found.scene()
-        source = found.source()
+        scene, source = found.scene(), found.source()
         self.take(source, scene, saved=source.loaded)
         self._autosave.write(source, scene)  # before the only copy goes away
         self.discard(found)
@@ -185,17 +183,13 @@ class Files:
     @property
     def suggestion(self) -> Path:
         """A name under which the scene can be saved."""
-        if self.options.save is not None:
-            return self.options.save
-        if self.source.path is not None and self.source.kind == "scene":
-            return self.source.path
-        return suggested_name(self.source, Path.cwd())
+        own = self.source.path if self.source.kind == "scene" else None
+        return self.options.save or own or suggested_name(self.source, Path.cwd())
 
     def save(self) -> None:
         """Saves where Ctrl+S saves; asks for a name where nothing may be overwritten."""
-        target = self.options.save
-        if target is None and self.source.path is not None and not is_protected(self.source.path):
-            target = self.source.path
+        own = self.source.path
+        target = self.options.save or (own if own is not None and not is_protected(own) else None)
         if target is None:
             self._parts.add("save")
         else:
@@ -261,9 +255,8 @@ class Files:
 
     def ask_to_close(self) -> None:
         """Closes the window, or asks first if something is unsaved; asked while it asks, it closes."""
-        shown = self._parts
-        if self.studio.unsaved and self.options.shot is None and "close" not in shown:
-            shown.add("close")
+        if self.studio.unsaved and self.options.shot is None and "close" not in self._parts:
+            self._parts.add("close")
         else:
             self.leave()
 
@@ -307,10 +300,7 @@ def _with_stereo(scene: Scene, word: str) -> Scene:
     if word in _STEREO_WORDS:
         return scene.model_copy(update={"stereo": None})
     try:
-        if scene.stereo is None:
-            return edited(scene, {"stereo": {"mode": word}})
         return edited(scene, {"stereo.mode": word})
     except SceneError as error:
-        raise SceneError(
-            error.message, replace(error.where, file="--stereo", line=None, column=None)
-        ) from error
+        where = replace(error.where, file="--stereo", line=None, column=None)
+        raise SceneError(error.message, where) from error

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import chain
 from typing import Any, TypeAlias
 
 from clfractal.errors import SceneError
@@ -164,14 +165,13 @@ def why_no_keys(scene: Scene, name: str) -> str:
 
 def movable(scene: Scene) -> list[Path]:
     """The paths of all values of a scene that can move and have a number now, in the schema's order."""
-    found: list[Path] = []
-    for name in Scene.model_fields:
-        if name not in _LEFT_OUT:
-            found += [path for path in _values((name,), getattr(scene, name)) if _moves(scene, path)]
+    names = [name for name in Scene.model_fields if name not in _LEFT_OUT]
+    paths = chain.from_iterable(_values((name,), getattr(scene, name)) for name in names)
+    found = [path for path in paths if _moves(scene, path)]
     if scene.formula.chain is None:
         bound = scene.chain.links[0].bound
-        paths = [("formula", "parameters", parameter.name) for parameter in bound.formula.parameters]
-        found += [path for path in paths if path not in found and _moves(scene, path)]
+        own = [("formula", "parameters", parameter.name) for parameter in bound.formula.parameters]
+        found += [path for path in own if path not in found and _moves(scene, path)]
     return found
 
 
@@ -186,8 +186,7 @@ def value_of(scene: Scene, path: Path) -> Any:
 
 def _parts(path: Path, old: Any, new: Any, names: Mapping[Path, str]) -> Iterator[tuple[Path, Any, Any]]:
     """A changed value, or the changed numbers of one whose numbers have tracks of their own."""
-    apart = path not in names and any(other[:-1] == path for other in names)
-    if not apart:
+    if path in names or all(other[:-1] != path for other in names):
         yield path, old, new
         return
     for number, after in enumerate(new):
@@ -201,10 +200,9 @@ def _with_partners(
 ) -> dict[Path, tuple[Any, Any]]:
     """With the target of a camera whose place has changed, or the other way round: where it moves, or both begin to."""
     all_of_them = dict(found)
-    for path in found:
-        if path[-1] not in ("position", "target"):
-            continue
-        other = (*path[:-1], "target" if path[-1] == "position" else "position")
+    partners = {"position": "target", "target": "position"}
+    for path in filter(lambda path: path[-1] in partners, found):
+        other = (*path[:-1], partners[path[-1]])
         value = _at(scene, other)
         if other not in found and _is_value(value) and (other in names or path not in names):
             all_of_them[other] = (value, value)
@@ -255,17 +253,20 @@ def _leaves(path: Path, old: Any, new: Any) -> Iterator[tuple[Path, Any, Any]]:
 
 
 def _values(path: Path, value: Any) -> Iterator[Path]:
-    if isinstance(value, Section):
-        for name in type(value).model_fields:
-            yield from _values((*path, name), value_under(value, name))
-    elif isinstance(value, Mapping):
-        for name, each in value.items():
-            yield from _values((*path, name), each)
-    elif isinstance(value, tuple) and not _is_value(value):
-        for number, each in enumerate(value):
-            yield from _values((*path, str(number)), each)
-    elif _is_value(value):
+    if _is_value(value):
         yield path
+        return
+    for name, each in _entries(value).items():
+        yield from _values((*path, name), each)
+
+
+def _entries(value: Any) -> Mapping[str, Any]:
+    """What a section, a mapping or a list has, by names and numbers."""
+    if isinstance(value, Section):
+        return {name: value_under(value, name) for name in type(value).model_fields}
+    if isinstance(value, tuple):
+        return {str(number): each for number, each in enumerate(value)}
+    return value if isinstance(value, Mapping) else {}
 
 
 def _is_value(value: Any) -> bool:
@@ -292,10 +293,6 @@ def _at(value: Any, path: Path) -> Any:
     for part in path:
         if isinstance(value, Section):
             value = value_under(value, part) if part in type(value).model_fields else _NOTHING
-        elif isinstance(value, Mapping):
-            value = value.get(part, _NOTHING)
-        elif isinstance(value, tuple) and part.isdecimal() and int(part) < len(value):
-            value = value[int(part)]
         else:
-            return _NOTHING
+            value = _entries(value).get(part, _NOTHING)
     return value

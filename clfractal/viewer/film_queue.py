@@ -196,11 +196,10 @@ class RenderedFilm:
 
     def cancel(self) -> None:
         """Ends it; frames that are done are kept. It is finished when its process has ended."""
-        if not self.under_way:
-            return
-        self.cancelled = True
-        if self._process is not None:
-            self._process.terminate()
+        if self.under_way:
+            self.cancelled = True
+            if self._process is not None:
+                self._process.terminate()
 
     def close(self) -> str:
         """Ends it because the window ends; what to say of that."""
@@ -222,14 +221,10 @@ class RenderedFilm:
 
     def _ended(self, status: int) -> None:
         """Takes the exit status of its process."""
-        if status == 0:
-            self.done, self.written = self.order.count, True
-            self._end("")
-        else:
-            self.done = self._frames_done()
-            self._end(
-                "" if self.cancelled else self._last_line() or f"the process ended with status {status}"
-            )
+        self.written = status == 0
+        self.done = self.order.count if self.written else self._frames_done()
+        well = self.written or self.cancelled
+        self._end("" if well else self._last_line() or f"the process ended with status {status}")
 
     def _frames_done(self) -> int:
         # Frames are made in order: only the next ones need a look, however many there are.
@@ -287,13 +282,10 @@ class FilmQueue:
 
     def clear(self, output: Path | None = None) -> None:
         """Forgets films that are no longer under way, or those of a name; the files stay."""
-        old = [
-            film
-            for film in self.films
-            if not film.under_way and (output is None or film.order.output == output)
-        ]
-        self.films = [film for film in self.films if film not in old]
-        self._leaving += [film for film in old if film.running]
+        for film in list(self.films):
+            if not film.under_way and output in (None, film.order.output):
+                self.films.remove(film)
+                self._leaving += [film] if film.running else []
 
     def order(self, order: FilmOrder, *, resume: bool = False) -> RenderedFilm:
         """Adds a film; one of the same name that had ended gives way to it, and its process ends before this begins."""

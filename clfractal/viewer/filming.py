@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
-from contextlib import suppress
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any
 
 from clfractal.errors import ClfractalError
@@ -22,6 +23,13 @@ from clfractal.viewer.kept_view import differ_in_more
 
 MOVING_SECONDS = 0.4
 """So long after a move more of it is expected."""
+
+
+@dataclass(slots=True)
+class Told:
+    """Whether something was wrong, and told."""
+
+    wrong: bool = False
 
 
 class InFilm(ABC):
@@ -54,6 +62,16 @@ class InFilm(ABC):
     @abstractmethod
     def tell(self, text: str, *, wrong: bool = False) -> None:
         """A line for the user; see `Studio`."""
+
+    @contextmanager
+    def telling(self) -> Iterator[Told]:
+        """Mistakes of users are told, instead of being raised; `Told.wrong` says afterwards whether there was one."""
+        told = Told()
+        try:
+            yield told
+        except ClfractalError as error:
+            told.wrong = True
+            self.tell(str(error), wrong=True)
 
     @abstractmethod
     def undo(self, kind: Kind = "scene") -> bool:
@@ -163,12 +181,11 @@ class InFilm(ABC):
 
     def _pose(self, document: Scene, frame: float | None, *, moving: bool = False) -> bool:
         """Shows a document at a frame; on a mistake all stays as it was, and a message tells it."""
-        try:
-            place = None
+        place = None
+        with self.telling() as told:
             if frame is not None and document.animation is not None:
-                place = film_place.place_at(document, min(frame, float(document.animation.count - 1)))
-        except ClfractalError as error:
-            self.tell(str(error), wrong=True)
+                place = _within(document, frame)
+        if told.wrong:
             return False
         self.place, self.scene = place, document if place is None else place.posed
         self._moving_until = time.perf_counter() + MOVING_SECONDS if moving else 0.0
@@ -215,17 +232,14 @@ class InFilm(ABC):
             gesture: see `Studio.edit`; while a drag goes on only the tracks are checked, at its end all frames.
         """
         before = self.document
-        try:
+        with self.telling():
             after = before.model_copy(update={"animation": animation})
             if gesture is None:
                 check_scene(after)
-        except ClfractalError as error:
-            self.tell(str(error), wrong=True)
-            return False
-        if not self._pose(after, self.frame_number or 0.0, moving=gesture is not None):
-            return False
-        self.history.add(before, after, gesture)
-        return True
+            if self._pose(after, self.frame_number or 0.0, moving=gesture is not None):
+                self.history.add(before, after, gesture)
+                return True
+        return False
 
     def end_drag(self) -> None:
         """Ends a drag of keys: all frames are checked, and it is taken back if one of them is not possible."""
@@ -241,20 +255,18 @@ class InFilm(ABC):
         place = self.place
         if place is None or self.scene.animation is None:
             return None
-        try:
+        with self.telling():
             found = film_place.keyed(self.scene, place)
             after = self.scene.model_copy(update={"animation": found.animation})
             check_scene(after)
             keyed = self._keyed_place(place, after)
-        except ClfractalError as error:
-            self.tell(str(error), wrong=True)
-            return None
-        if found.keyed:
-            self.history.seal()
-            self.history.add(self.scene, after, None, place.frame)
-            self.scene, self.place = after, keyed
-            self.refresh()
-        return found
+            if found.keyed:
+                self.history.seal()
+                self.history.add(self.scene, after, None, place.frame)
+                self.scene, self.place = after, keyed
+                self.refresh()
+            return found
+        return None
 
     def changed(self) -> dict[film_place.Path, tuple[Any, Any]]:
         """What was changed at the frame that is shown, and has no key: by path, (before, after)."""
@@ -277,15 +289,12 @@ class InFilm(ABC):
             return scene, None
         if not self.auto_keys or self.recording:
             return scene, place
-        try:
+        with self.telling():
             found = film_place.keyed(scene, place, tracked_only=True)
-            if not found.keyed:
-                return scene, place
-            scene = scene.model_copy(update={"animation": found.animation})
-            return scene, self._keyed_place(place, scene)
-        except ClfractalError as error:
-            self.tell(str(error), wrong=True)
-            return scene, place
+            if found.keyed:
+                scene = scene.model_copy(update={"animation": found.animation})
+                place = self._keyed_place(place, scene)
+        return scene, place
 
     @staticmethod
     def _keyed_place(place: FilmPlace, scene: Scene) -> FilmPlace:
@@ -307,16 +316,13 @@ class InFilm(ABC):
             at = None if changed.animation is None or shown is None else _within(changed, shown)
             self.place, self.scene = at, changed if at is None else at.posed
             return
+        scene = self.scene
         if place is None or place.frame != frame:
             place = _within(document, frame)
             scene = place.posed
-        else:
-            scene = self.scene
         scene = replaced(scene, sections)
-        if scene.animation is None:
-            self.place, self.scene = None, scene
-        else:
-            self.place, self.scene = self._keyed_place(place, scene), scene
+        at = None if scene.animation is None else self._keyed_place(place, scene)
+        self.place, self.scene = at, scene
 
 
 def _within(document: Scene, frame: float) -> FilmPlace:

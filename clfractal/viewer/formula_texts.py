@@ -105,8 +105,7 @@ def with_formula_text(text: str, formula: str) -> str:
             lines += [f"{_INDENT}inline:", textwrap.indent(formula.rstrip(), 2 * _INDENT)]
         else:
             lines.append(f"{_INDENT}{text[key.start : key.end]}: {text[each.start : each.end]}")
-    before = text[: section.start].rstrip(" ")
-    return f"{before}\n" + "\n".join(lines) + text[section.end :]
+    return f"{text[: section.start].rstrip(' ')}\n" + "\n".join(lines) + text[section.end :]
 
 
 def _end(text: str, value: spans.Mapping) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 from clfractal.device.select import Device
 from clfractal.engine.canvas import Canvas
@@ -14,59 +14,18 @@ from clfractal.scene.model import Scene
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Frame:
-    """A picture on the device, coarse or whole, perhaps still growing.
+class Growth:
+    """How far a picture is.
 
     Attributes:
-        number: rises from frame to frame.
-        request: number of the request that it answers.
-        scene: as it was rendered, with the size of the viewport.
-        job: all that was decided of it; its views are those of the whole picture.
         views: as rendered (coarse ones, while it is coarse).
-        canvas: where it is.
         divider: pixels, in each direction, that one ray stands for.
         samples: that every pixel has.
         finished: whether it has the bits of the shell's picture.
         seconds: that rendering took so far, without compiling.
         frame_seconds: that the last pass took.
         smoothing: how strongly the noise of each view is smoothed when it is shown, see `clfractal.engine.show`.
-        stamp: the canvas's, while it holds this frame.
     """
-
-    number: int
-    request: int
-    scene: Scene
-    job: Job
-    views: tuple[PlannedView, ...]
-    canvas: Canvas
-    divider: int
-    samples: int
-    finished: bool
-    seconds: float
-    frame_seconds: float
-    smoothing: tuple[float, ...]
-    stamp: int = 0
-
-    @classmethod
-    def of(cls, number: int, request: int, scene: Scene, job: Job, canvas: Canvas, growth: Growth) -> Frame:
-        """The frame of what is on a canvas now."""
-        grown = (growth.divider, growth.samples, growth.finished, growth.seconds, growth.frame_seconds)
-        return cls(number, request, scene, job, growth.views, canvas, *grown, growth.smoothing, canvas.stamp)
-
-    @property
-    def is_draft(self) -> bool:
-        """Whether it is shaded cheaply, because the scene moves whose light goes along paths."""
-        return self.job.scene.lighting != self.scene.lighting
-
-    @property
-    def arrangement(self) -> Arrangement:
-        """Where its views lie."""
-        return Arrangement.of(self.job)
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Growth:
-    """How far a picture is; see `Frame`."""
 
     views: tuple[PlannedView, ...]
     divider: int
@@ -81,7 +40,44 @@ class Growth:
         cls, views: tuple[PlannedView, ...], divider: int, seconds: float, frame_seconds: float
     ) -> Growth:
         """That of a coarse picture, which has one sample for each of its own pixels."""
-        return cls(views, divider, 1, False, seconds, frame_seconds, (smoothing_of(1),) * len(views))
+        return Growth(views, divider, 1, False, seconds, frame_seconds, (smoothing_of(1),) * len(views))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Frame(Growth):
+    """A picture on the device, coarse or whole, perhaps still growing.
+
+    Attributes:
+        number: rises from frame to frame.
+        request: number of the request that it answers.
+        scene: as it was rendered, with the size of the viewport.
+        job: all that was decided of it; its views are those of the whole picture.
+        canvas: where it is.
+        stamp: the canvas's, while it holds this frame.
+    """
+
+    number: int
+    request: int
+    scene: Scene
+    job: Job
+    canvas: Canvas
+    stamp: int
+
+    @classmethod
+    def of(cls, number: int, request: int, scene: Scene, job: Job, canvas: Canvas, growth: Growth) -> Frame:
+        """The frame of what is on a canvas now."""
+        grown = (getattr(growth, each.name) for each in fields(growth))
+        return cls(*grown, number, request, scene, job, canvas, canvas.stamp)
+
+    @property
+    def is_draft(self) -> bool:
+        """Whether it is shaded cheaply, because the scene moves whose light goes along paths."""
+        return self.job.scene.lighting != self.scene.lighting
+
+    @property
+    def arrangement(self) -> Arrangement:
+        """Where its views lie."""
+        return Arrangement.of(self.job)
 
 
 class CanvasPool:

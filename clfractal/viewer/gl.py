@@ -81,20 +81,15 @@ def new_texture(width: int, height: int, *, smooth: bool = False) -> int:
 
 def fill_texture(texture: int, pixels: Pixels) -> None:
     """Fills a texture with pixels of shape (height, width, 4)."""
-    height, width = pixels.shape[:2]
+    _fill(texture, pixels.shape, np.ascontiguousarray(pixels))
+
+
+def _fill(texture: int, shape: tuple[int, ...], source: Any) -> None:
+    """Fills a texture from the host's memory, or from the pixel buffer that is bound."""
+    kind = (GL.GL_RGBA, GL.GL_UNSIGNED_BYTE)
     GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
     GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, 0)
-    GL.glTexSubImage2D(
-        GL.GL_TEXTURE_2D,
-        0,
-        0,
-        0,
-        width,
-        height,
-        GL.GL_RGBA,
-        GL.GL_UNSIGNED_BYTE,
-        np.ascontiguousarray(pixels),
-    )
+    GL.glTexSubImage2D(GL.GL_TEXTURE_2D, 0, 0, 0, shape[1], shape[0], *kind, source)
 
 
 def delete_texture(texture: int) -> None:
@@ -125,11 +120,7 @@ class Upload:
         place = GL.glMapBufferRange(GL.GL_PIXEL_UNPACK_BUFFER, 0, pixels.nbytes, access)
         ctypes.memmove(place, pixels.ctypes.data, pixels.nbytes)
         GL.glUnmapBuffer(GL.GL_PIXEL_UNPACK_BUFFER)
-        GL.glBindTexture(GL.GL_TEXTURE_2D, self.texture)
-        GL.glPixelStorei(GL.GL_UNPACK_ROW_LENGTH, 0)
-        GL.glTexSubImage2D(
-            GL.GL_TEXTURE_2D, 0, 0, 0, width, height, GL.GL_RGBA, GL.GL_UNSIGNED_BYTE, ctypes.c_void_p(0)
-        )
+        _fill(self.texture, pixels.shape, ctypes.c_void_p(0))
         GL.glBindBuffer(GL.GL_PIXEL_UNPACK_BUFFER, 0)
 
     def close(self) -> None:
@@ -169,9 +160,8 @@ class Rectangle:
         GL.glUseProgram(self._program)
         GL.glActiveTexture(GL.GL_TEXTURE0)
         GL.glBindTexture(GL.GL_TEXTURE_2D, texture)
-        kind = GL.GL_LINEAR if smooth else GL.GL_NEAREST
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MAG_FILTER, kind)
-        GL.glTexParameteri(GL.GL_TEXTURE_2D, GL.GL_TEXTURE_MIN_FILTER, kind)
+        for name in (GL.GL_TEXTURE_MAG_FILTER, GL.GL_TEXTURE_MIN_FILTER):
+            GL.glTexParameteri(GL.GL_TEXTURE_2D, name, GL.GL_LINEAR if smooth else GL.GL_NEAREST)
         GL.glUniform4f(self._part, *part)
         GL.glBindVertexArray(self._array)
         GL.glDrawArrays(GL.GL_TRIANGLE_STRIP, 0, 4)
@@ -203,8 +193,7 @@ def clear(color: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> None:
 
 def draw_to(eye: str | None) -> None:
     """Chooses the buffer of one eye (`left`, `right`), or both."""
-    chosen = {None: GL.GL_BACK, "left": GL.GL_BACK_LEFT, "right": GL.GL_BACK_RIGHT}[eye]
-    GL.glDrawBuffer(chosen)
+    GL.glDrawBuffer({None: GL.GL_BACK, "left": GL.GL_BACK_LEFT, "right": GL.GL_BACK_RIGHT}[eye])
 
 
 def read_pixels(width: int, height: int) -> Pixels:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -124,8 +125,7 @@ def focus_at(camera: AnyCamera, depth: float) -> AnyCamera:
 def _source(light: DirectionalLight) -> Floats:
     """The direction towards the light, of length 1."""
     direction = np.array(light.direction)
-    found: Floats = -direction / np.linalg.norm(direction)
-    return found
+    return cast(Floats, -direction / np.linalg.norm(direction))
 
 
 def _placed(light: Light, position: Floats) -> Light:

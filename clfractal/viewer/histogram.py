@@ -60,10 +60,7 @@ class HistogramTask:
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `background.Task`."""
-        try:
-            self.found = _filled(self.scene, executor, token, tell)
-        except ClfractalError as error:
-            self.failed(error)
+        self.found = _filled(self.scene, executor, token, tell)
 
     def failed(self, error: ClfractalError) -> None:
         """See `background.Task`."""

@@ -73,21 +73,19 @@ class History:
 
     def undo(self, kind: Kind) -> dict[str, Any] | None:
         """The sections to put back, or None if there is no step."""
-        stack = self._stacks[kind]
-        if not stack.done:
+        stack, step = self._stacks[kind], self.next_step(kind)
+        if step is None:
             return None
-        step = stack.done.pop()
         step.gesture = None
-        stack.undone.append(step)
+        stack.undone.append(stack.done.pop())
         return step.before
 
     def redo(self, kind: Kind) -> dict[str, Any] | None:
         """The sections of the step that was undone last, or None."""
-        stack = self._stacks[kind]
-        if not stack.undone:
+        stack, step = self._stacks[kind], self.next_step(kind, redo=True)
+        if step is None:
             return None
-        step = stack.undone.pop()
-        stack.done.append(step)
+        stack.done.append(stack.undone.pop())
         return step.after
 
     def next_step(self, kind: Kind, *, redo: bool = False) -> Step | None:

@@ -7,7 +7,6 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.errors import ClfractalError
 from clfractal.viewer import window
 from clfractal.viewer.flying import Key
 from clfractal.viewer.keys import KEYS, PRINTABLE, Context, KeyEvent
@@ -91,31 +90,23 @@ class Inputs:
         work = self.workspace
         if self._recorder is not None and event.kind in _RECORDED:
             self._recorder.add(event, now - self._start if self._start is not None else 0.0)
-        values: Any = event.values
-        handler = getattr(self, f"_{event.kind}", None)
+        handler: Any = getattr(self, f"_{event.kind}", None)
         if handler is not None:
-            try:
-                handler(now, *values)
-            except ClfractalError as error:
-                work.studio.tell(str(error), wrong=True)
+            with work.studio.telling():
+                handler(now, *event.values)
 
     def _move(self, now: float, x: float, y: float) -> None:
         work = self.workspace
         size, framebuffer = work.window.size, work.window.framebuffer
-        self.workspace.pointer = (
-            x * framebuffer[0] / max(size[0], 1),
-            y * framebuffer[1] / max(size[1], 1),
-        )
+        work.pointer = (x * framebuffer[0] / max(size[0], 1), y * framebuffer[1] / max(size[1], 1))
+        before, self._before = self._before, (x, y) if self.operators.flying else None
         if self.operators.flying:
-            if self._before is not None:
-                dx, dy = x - self._before[0], y - self._before[1]
-                work.motion.turn(_LOOK * dx * work.settings.mouse, _LOOK * dy * work.settings.mouse)
-            self._before = (x, y)
+            if before is not None:
+                speed = _LOOK * work.settings.mouse
+                work.motion.turn(speed * (x - before[0]), speed * (y - before[1]))
             return
-        self._before = None
-        across, down = work.places.to_ui(*self.workspace.pointer)
-        io = imgui.get_io()
-        io.add_mouse_pos_event(across / work.ui.scale, down / work.ui.scale)
+        across, down = work.places.to_ui(*work.pointer)
+        imgui.get_io().add_mouse_pos_event(across / work.ui.scale, down / work.ui.scale)
         if work.controls.dragging:
             work.controls.move(self._in_picture())
 
@@ -141,11 +132,10 @@ class Inputs:
         work, io = self.workspace, imgui.get_io()
         if self.operators.flying:
             work.motion.fly.faster(dy)
-            return
-        if io.want_capture_mouse:
+        elif io.want_capture_mouse:
             io.add_mouse_wheel_event(dx, dy)
-            return
-        work.controls.wheel(dy, _mods(), work.aim_at(*self.workspace.pointer), now)
+        else:
+            work.controls.wheel(dy, _mods(), work.aim_at(*work.pointer), now)
 
     def _key(self, now: float, key: int, scancode: int, action: int, mods: int) -> None:
         work, io = self.workspace, imgui.get_io()
@@ -154,9 +144,7 @@ class Inputs:
         typed = KEYS.get(name.upper(), key) if name is not None else key
         work.renderer.keyboard_callback(work.window.handle, typed, scancode, action, mods)
         if action == RELEASE:
-            held = self._held.pop(key, None)
-            if held is not None:
-                work.motion.keys.discard(held)
+            work.motion.keys -= {self._held.pop(key, None)}
             return
         typing = io.want_text_input or keyboard.inside(work.ui)
         context: Context = "text" if typing else "fly" if self.operators.flying else "picture"

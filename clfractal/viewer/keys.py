@@ -56,7 +56,6 @@ _OTHER_NAMES = {
 _OTHER_MODIFIERS = {"control": "Ctrl", "win": "Super", "cmd": "Super", "meta": "Super"}
 _KEYS_BY_LOWER = {**{name.lower(): name for name in KEYS}, **_OTHER_NAMES}
 _MODIFIERS_BY_LOWER = {**{name.lower(): name for name in _MODIFIERS}, **_OTHER_MODIFIERS}
-_CODES = {code: name for name, code in KEYS.items()}
 
 By: TypeAlias = Literal["position", "label"]
 Layout: TypeAlias = Mapping[int, str]
@@ -267,9 +266,4 @@ def _keys_text(actions: Sequence[Sequence[str]]) -> str:
     return " / ".join(", ".join(texts) for texts in actions)
 
 
-def key_name(code: int) -> str | None:
-    """The name in `KEYS` of one of GLFW's codes, or None."""
-    return _CODES.get(code)
-
-
-__all__ = ["ACTIONS", "KEYS", "Action", "Chord", "Context", "KeyEvent", "KeyMap", "Layout", "key_name"]
+__all__ = ["ACTIONS", "KEYS", "Action", "Chord", "Context", "KeyEvent", "KeyMap", "Layout"]

@@ -94,6 +94,9 @@ class Motion:
             return False
         self.fly.vertical = self.studio.saved.camera.up if self.level else None
         camera = self.fly.step(self.studio.scene.camera, keys, look, seconds, self.depth)
+        return self._flown(camera)
+
+    def _flown(self, camera: AnyCamera) -> bool:
         self._flew = True
         self.studio.set_camera(camera, "fly")
         return True
@@ -121,11 +124,8 @@ class Motion:
         for value, positive, negative in pairs:
             if abs(value) > 0.5:
                 keys.add(positive if value > 0 else negative)
-        if len(buttons) > 5:
-            if buttons[4]:
-                keys.add("roll_left")
-            if buttons[5]:
-                keys.add("roll_right")
+        rolls: tuple[tuple[int, Key], ...] = ((4, "roll_left"), (5, "roll_right"))
+        keys |= {key for number, key in rolls if len(buttons) > 5 and buttons[number]}
         turned = [value if abs(value) > _DEAD else 0.0 for value in axes[2:4]]
         return look[0] + turned[0] * _TURN * seconds, look[1] + turned[1] * _TURN * seconds
 
@@ -134,12 +134,9 @@ class Motion:
         axes = np.where(np.abs(six) > _DEAD, six, 0.0)
         if not axes.any():
             return False
-        camera = self.studio.scene.camera
-        size = self.studio.viewport
+        camera, size = self.studio.scene.camera, self.studio.viewport
         pixels = 600 * seconds * self.sensitivity
         camera = pan(camera, axes[0] * pixels, axes[2] * pixels, size, float("inf"))
         camera = dolly(camera, float(np.exp(-axes[1] * 1.5 * seconds)))
-        camera = orbit(camera, pose_of(camera).target, axes[5] * pixels, axes[3] * pixels, size, "free")
-        self._flew = True
-        self.studio.set_camera(camera, "fly")
-        return True
+        turned = orbit(camera, pose_of(camera).target, axes[5] * pixels, axes[3] * pixels, size, "free")
+        return self._flown(turned)

@@ -8,6 +8,7 @@ import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
+from itertools import count
 from pathlib import Path
 from typing import Any
 
@@ -57,12 +58,10 @@ def data_files(scene: Scene) -> list[str]:
 def renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
     """The scene with other names of its maps, grids, textures and tables of lights."""
     changes = _renamed_parts(scene, names)
-    materials = with_textures(scene.materials, names)
-    if materials != scene.materials:
-        changes["materials"] = materials
-    objects = with_grids(scene.objects, names)
-    if objects != scene.objects:
-        changes["objects"] = objects
+    for key, change in (("materials", with_textures), ("objects", with_grids)):
+        changed = change(getattr(scene, key), names)
+        if changed != getattr(scene, key):
+            changes[key] = changed
     if scene.layout is not None:
         views = tuple(
             view.model_copy(update=parts) if (parts := _renamed_parts(view, names)) else view
@@ -106,20 +105,12 @@ class Carried:
                 raise FileError(f"cannot be copied: {error.strerror}", Where(str(source))) from error
             self.made.append(target)
 
-    def undo(self) -> None:
-        """Removes the copies."""
-        for target in self.made:
+    def undo(self, *, formulas: bool = False) -> None:
+        """Removes the copies; with `formulas` only those of formula files: the formula is written into the scene."""
+        for target in [each for each in self.made if not formulas or each in self.formulas]:
             with suppress(OSError):
                 target.unlink()
-        self.made.clear()
-
-    def undo_formulas(self) -> None:
-        """Removes the copies of formula files, because the formula is written into the scene."""
-        gone = [target for target in self.made if target in self.formulas]
-        for target in gone:
-            with suppress(OSError):
-                target.unlink()
-        self.made = [target for target in self.made if target not in gone]
+            self.made.remove(target)
 
 
 def carried(formula: Any, formula_folder: Path, data: list[str], data_folder: Path, target: Path) -> Carried:
@@ -220,23 +211,19 @@ def _place(plan: Carried, name: str, companions: list[str], old: Path, new: Path
         raise FileError("is missing, so it cannot go along with the scene", Where(str(source)))
     with suppress(ValueError):
         return source.resolve().relative_to(new.resolve()).as_posix()
-    plain = Path(name)
-    number = 1
-    while True:
-        if number == 1:
-            candidate = plain
-        elif companions:
-            # Their names stand in the file, so that they need a folder of their own.
-            candidate = plain.parent / f"{plain.stem}-{number}" / plain.name
-        else:
-            candidate = plain.with_name(f"{plain.stem}-{number}{plain.suffix}")
+    plain = candidate = Path(name)
+    for number in count(2):
         safe_path(candidate.as_posix(), new, Where(name))
         wanted = {source: new / candidate}
         wanted |= {source.parent / each: (new / candidate).parent / each for each in companions}
         if all(_is_free(plan, one, other) for one, other in wanted.items()):
             plan.copies |= {one: other for one, other in wanted.items() if not other.exists()}
-            return candidate.as_posix()
-        number += 1
+            break
+        numbered = f"{plain.stem}-{number}"
+        # The names of companions stand in the file, so that they need a folder of their own.
+        beside = plain.parent / numbered / plain.name if companions else None
+        candidate = beside or plain.with_name(f"{numbered}{plain.suffix}")
+    return candidate.as_posix()
 
 
 def _is_free(plan: Carried, source: Path, target: Path) -> bool:

@@ -9,7 +9,6 @@ from pathlib import Path
 from imgui_bundle import imgui
 
 from clfractal.device.select import choose, devices
-from clfractal.errors import ClfractalError
 from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
 from clfractal.viewer.panels import all_panels, keyboard
@@ -99,15 +98,14 @@ class Operators:
         studio = self.workspace.studio
         studio.begin_topic(name)
         try:
-            kind, colon, rest = name.partition(":")
-            if colon and kind == "device":
-                self.workspace.use_device(choose(rest))
-            elif colon and kind == "open":
-                self.workspace.files.open(Path(rest))
-            elif name in self._operators:
-                self._operators[name]()
-        except ClfractalError as error:
-            studio.tell(str(error), wrong=True)
+            with studio.telling():
+                kind, colon, rest = name.partition(":")
+                if colon and kind == "device":
+                    self.workspace.use_device(choose(rest))
+                elif colon and kind == "open":
+                    self.workspace.files.open(Path(rest))
+                elif name in self._operators:
+                    self._operators[name]()
         finally:
             studio.begin_topic("")
 
@@ -187,8 +185,8 @@ class Operators:
         place = next((n for n, info in enumerate(there) if info.index == now.index), -1)
         if len(there) < 2:
             self.workspace.studio.tell("there is no other device")
-            return
-        self.workspace.use_device(choose(there[(place + 1) % len(there)].index))
+        else:
+            self.workspace.use_device(choose(there[(place + 1) % len(there)].index))
 
     def _second_window(self) -> None:
         self.workspace.outputs.open_second()
@@ -200,19 +198,16 @@ class Operators:
         self.workspace.studio.tell("the scene is in the clipboard")
 
     def _pause(self) -> None:
-        session = self.workspace.studio.session
-        session.pause(not session.paused)
-        paused = session.paused
+        session, paused = self.workspace.studio.session, not self.workspace.studio.session.paused
+        session.pause(paused)
         self.workspace.studio.tell(
             "paused" if paused else "gathering samples", holds=lambda: session.paused == paused
         )
 
     def _coarse(self) -> None:
-        settings = replace(self.workspace.settings, coarse=not self.workspace.settings.coarse)
-        self.workspace.set_settings(settings)
-        self.workspace.studio.tell(
-            "moving pictures may be coarse" if settings.coarse else "moving pictures are never coarse"
-        )
+        coarse = not self.workspace.settings.coarse
+        self.workspace.set_settings(replace(self.workspace.settings, coarse=coarse))
+        self.workspace.studio.tell(f"moving pictures {'may be' if coarse else 'are never'} coarse")
 
     def _orbit_style(self) -> None:
         free = self.workspace.settings.orbit == "free"

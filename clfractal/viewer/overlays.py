@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import cast
+
 import numpy as np
 import numpy.typing as npt
 
@@ -56,8 +58,7 @@ def split(segments: npt.ArrayLike, pieces: int) -> Floats:
     ends = np.asarray(segments, float).reshape(-1, 2, 3)
     cuts = np.linspace(0, 1, pieces + 1)[:, None]
     points = ends[:, None, 0] * (1 - cuts) + ends[:, None, 1] * cuts
-    found: Floats = np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3)
-    return found
+    return cast(Floats, np.stack([points[:, :-1], points[:, 1:]], axis=2).reshape(-1, 2, 3))
 
 
 def hidden(
@@ -80,19 +81,7 @@ def hidden(
     row = np.clip(place[:, 1].astype(int), 0, rows - 1)
     with np.errstate(invalid="ignore"):
         behind = _middle_depth(view, depths) * (1 - slack) > surface[row, column]
-    found: npt.NDArray[np.bool_] = seen & behind
-    return found
-
-
-def circle(center: npt.ArrayLike, radius: float, axis: npt.ArrayLike, pieces: int = 64) -> Floats:
-    """A circle about an axis, for the outline of a ball: segments, shape (pieces, 2, 3)."""
-    normal = np.asarray(axis, float) / np.linalg.norm(axis)
-    across = np.cross(normal, np.eye(3)[int(np.argmin(np.abs(normal)))])
-    across /= np.linalg.norm(across)
-    angles = np.linspace(0, 2 * np.pi, pieces + 1)[:, None]
-    points = np.cos(angles) * across + np.sin(angles) * np.cross(normal, across)
-    points = np.asarray(center, float) + radius * points
-    return np.stack([points[:-1], points[1:]], axis=1)
+    return cast(npt.NDArray[np.bool_], seen & behind)
 
 
 def _plane_distance(view: View) -> float:
@@ -116,12 +105,10 @@ def _homogeneous(view: View, points: Floats, size: Size) -> tuple[Floats, Floats
 
 def _between(values: Floats, parts: Floats) -> Floats:
     """Values at both parts of the way from the first column to the second, shape (n, 2); exact at the ends."""
-    found: Floats = values[:, :1] * (1 - parts) + values[:, 1:] * parts
-    return found
+    return cast(Floats, values[:, :1] * (1 - parts) + values[:, 1:] * parts)
 
 
 def _middle_depth(view: View, depths: Floats) -> Floats:
     """The depth in the middle of a segment's picture: an eye sees the harmonic mean there."""
     start, end = depths[:, 0], depths[:, 1]
-    found: Floats = (start + end) / 2 if view.eye is None else 2 * start * end / (start + end)
-    return found
+    return cast(Floats, (start + end) / 2 if view.eye is None else 2 * start * end / (start + end))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 
 from clfractal.files import resources
@@ -12,26 +11,18 @@ _OWN_FOLDERS = ("scenes", "environments", "formulas/library", "kernels")
 
 def is_own(path: Path) -> bool:
     """Whether a file lies in one of the program's own folders, or is a link to such a file."""
+    own = _identity(path)
+    if own is None:
+        return False
+    parents = {_identity(parent) for parent in path.resolve().parents} - {None}
+    folders = [resources.folder(name) for name in _OWN_FOLDERS]
+    return any(_identity(folder) in parents or own in map(_identity, folder.iterdir()) for folder in folders)
+
+
+def _identity(path: Path) -> tuple[int, int] | None:
+    """What tells a file from all others, whatever it is called; None if there is none."""
     try:
         status = path.stat()
     except OSError:
-        return False
-    key = (status.st_dev, status.st_ino)
-    parents = {
-        (found.st_dev, found.st_ino) for parent in path.resolve().parents if (found := _status(parent))
-    }
-    for name in _OWN_FOLDERS:
-        folder = resources.folder(name)
-        inside = _status(folder)
-        if inside is not None and (inside.st_dev, inside.st_ino) in parents:
-            return True
-        if any((found.st_dev, found.st_ino) == key for file in folder.iterdir() if (found := _status(file))):
-            return True
-    return False
-
-
-def _status(path: Path) -> os.stat_result | None:
-    try:
-        return path.stat()
-    except OSError:
         return None
+    return status.st_dev, status.st_ino

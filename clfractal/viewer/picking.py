@@ -11,6 +11,7 @@ from clfractal.images.modes import eye_at
 from clfractal.images.tiled import Floats
 from clfractal.integrators.plan import PlannedView
 from clfractal.viewer.display import Shown
+from clfractal.viewer.pointer import vector
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -64,7 +65,6 @@ def picked(shown: Shown, x: float, y: float) -> Pick | None:
         image = (view.scene.image.width, view.scene.image.height)
         point = None
         if np.isfinite(depth):
-            near = camera.points_at([column], [row], image, [depth])[0]
-            point = (float(near[0]), float(near[1]), float(near[2]))
+            point = vector(camera.points_at([column], [row], image, [depth])[0])
         return Pick(view, camera, column, row, image, depth, point, depths)
     return None

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
@@ -13,7 +11,7 @@ from clfractal.integrators import points
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.viewer.background import Tell
 from clfractal.viewer.picking import Pick
-from clfractal.viewer.pointer import ray_at
+from clfractal.viewer.pointer import ray_at, vector
 from clfractal.viewer.studio import Studio
 
 Point = tuple[float, float, float]
@@ -28,38 +26,28 @@ class Counted:
     """
 
     def __init__(self, key: Any, pick: Pick, point: Point, iterations: int) -> None:
-        self.key, self.text = key, ""
-        self._scene, self._plan, self._point, self._iterations = (
-            pick.view.scene,
-            pick.view.plan,
-            point,
-            iterations,
-        )
-        self._finished = False
-
-    @property
-    def finished(self) -> bool:
-        """See `Task`."""
-        return self._finished
+        self.key, self.text, self.finished = key, "", False
+        self._view, self._point, self._iterations = pick.view, point, iterations
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Tell) -> None:
         """See `Task`."""
+        scene, plan = self._view.scene, self._view.plan
         counts, inside = points.escape(
-            self._scene.chain,
+            scene.chain,
             [self._point],
             self._iterations,
             device=executor.device,
-            lanes=self._plan.lanes,
-            precision=self._plan.precision,
-            bailout=self._scene.formula.bailout,
+            lanes=plan.lanes,
+            precision=plan.precision,
+            bailout=scene.formula.bailout,
             token=token,
         )
-        self.text = f"{int(counts[0])}, inside" if bool(inside[0]) else f"{int(counts[0])}"
-        self._finished = True
+        self.text = f"{int(counts[0])}{', inside' if inside[0] else ''}"
+        self.finished = True
 
     def failed(self, error: ClfractalError) -> None:
         """See `Task`."""
-        self._finished = True
+        self.finished = True
 
 
 class PlaneCount:
@@ -90,5 +78,4 @@ def point_on_plane(pick: Pick) -> Point | None:
     """The point of space that a cut plane's own picture shows; None where the view shows something else."""
     if not isinstance(pick.view.scene.renderer, CutPlaneRenderer):
         return None
-    x, y, z = np.asarray(ray_at(pick.camera, pick.x, pick.y, pick.size)[0]).tolist()
-    return x, y, z
+    return vector(ray_at(pick.camera, pick.x, pick.y, pick.size)[0])

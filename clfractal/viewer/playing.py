@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from clfractal.errors import ClfractalError
+from collections.abc import Sequence
+
 from clfractal.scene.animation import MAX_FRAMES, Animation
 from clfractal.scene.parts import AnyCamera
 from clfractal.viewer import film_place
@@ -140,12 +141,9 @@ class Player:
             self._from, self._since = self.studio.frame_number or 0.0, self._now
 
     def _tell_unkeyed(self) -> None:
-        names = self.studio.unkeyed()
+        names, frame = self.studio.unkeyed(), self.studio.frame_number
         if names:
-            listed = ", ".join(names[:3]) + (" and others" if len(names) > 3 else "")
-            self.studio.tell(
-                f"without a key, {listed} went back to the film at frame {self.studio.frame_number:g}"
-            )
+            self.studio.tell(f"without a key, {_listed(names, 3)} went back to the film at frame {frame:g}")
 
     _now = 0.0
 
@@ -188,13 +186,9 @@ class Player:
     def by(self, frames: int) -> None:
         """Some frames on, or back; from the end to the beginning where the film repeats."""
         film, now = self.film, self.studio.frame_number
-        if film is None:
-            return
-        self.stop()
-        frame = round(now or 0.0) + frames if now is not None else 0
-        if self.repeat:
-            frame %= film.count
-        self.show(frame)
+        if film is not None:
+            frame = round(now) + frames if now is not None else 0
+            self._stop_at(frame % film.count if self.repeat else frame)
 
     def to_key(self, way: int) -> None:
         """To the next frame with a key, or with -1 to the one before."""
@@ -202,8 +196,8 @@ class Player:
         if film is None:
             return
         self.stop()
-        frame = self.studio.frame_number or 0.0
-        found = timeline.key_after(film, frame) if way > 0 else timeline.key_before(film, frame)
+        find = timeline.key_after if way > 0 else timeline.key_before
+        found = find(film, self.studio.frame_number or 0.0)
         if found is None:
             self.studio.tell(f"there is no key {'after' if way > 0 else 'before'} this frame")
         else:
@@ -211,28 +205,25 @@ class Player:
 
     def to_end(self, way: int) -> None:
         """To the last frame, or with -1 to the first."""
-        film = self.film
-        if film is not None:
-            self.stop()
-            self.show(film.count - 1 if way > 0 else 0)
+        if self.film is not None:
+            self._stop_at(self.film.count - 1 if way > 0 else 0)
+
+    def _stop_at(self, frame: float) -> None:
+        self.stop()
+        self.show(frame)
 
     # Keys
 
     def set_keys(self) -> None:
         """Sets keys for what was changed at this frame; tells what became of it."""
         studio = self.studio
-        if studio.scene.animation is None and not studio.set_animation(timeline.new_film()):
-            return
-        if studio.frame_number is None:
-            studio.go_to_frame(0.0)
-        found = studio.set_keys()
+        found = studio.set_keys() if self._in_film() else None
         if found is None:
             return
         for name in found.refused:
             studio.tell(f"{name}: {film_place.why_no_keys(studio.scene, name)}", wrong=True)
         if found.keyed:
-            listed = ", ".join(found.keyed[:4]) + (" and others" if len(found.keyed) > 4 else "")
-            studio.tell(f"keys at frame {studio.frame_number:g}: {listed}")
+            studio.tell(f"keys at frame {studio.frame_number:g}: {_listed(found.keyed, 4)}")
         elif not found.refused:
             studio.tell("nothing was changed at this frame; + in the timeline adds a track")
 
@@ -245,9 +236,7 @@ class Player:
             self._end_recording()
             return
         self.stop()
-        if studio.scene.animation is None and not studio.set_animation(timeline.new_film()):
-            return
-        if studio.frame_number is None and not studio.go_to_frame(0.0):
+        if not self._in_film():
             return
         self._samples, self._first = [], studio.scene.camera
         self._start = studio.frame_number or 0.0
@@ -257,6 +246,13 @@ class Player:
             "recording: begins with the first move",
             holds=lambda: studio.recording and len(self._samples) < 2,
         )
+
+    def _in_film(self) -> bool:
+        """Shows a frame of the film, of a new one if there is none; whether that is possible."""
+        studio = self.studio
+        if studio.scene.animation is None and not studio.set_animation(timeline.new_film()):
+            return False
+        return studio.frame_number is not None or studio.go_to_frame(0.0)
 
     def _recorded(self, now: float, film: Animation) -> bool:
         studio = self.studio
@@ -291,17 +287,14 @@ class Player:
             return
         # The camera's own steps of undo were the recording; as the film's they are one.
         studio.go_to_frame(self._start)
-        try:
-            animation = flight(studio.scene, samples, self._start)
-        except ClfractalError as error:
-            studio.tell(str(error), wrong=True)
-            return
-        if studio.set_animation(animation):
-            count = sum(
-                1
-                for key in animation.tracks["camera.position"].keys or ()
-                if self._start <= animation.frame_of(key) <= self._start + samples[-1].frame + 1
-            )
-            studio.tell(
-                f"recorded {samples[-1].frame / animation.fps:.1f} s of flight as {counted(count, 'key')}"
-            )
+        with studio.telling():
+            animation, frames = flight(studio.scene, samples, self._start), samples[-1].frame
+            if studio.set_animation(animation):
+                end = self._start + frames + 1
+                keys = timeline.keys_between(animation, self._start, end, ["camera.position"])
+                count = counted(len(keys), "key")
+                studio.tell(f"recorded {frames / animation.fps:.1f} s of flight as {count}")
+
+
+def _listed(names: Sequence[str], most: int) -> str:
+    return ", ".join(names[:most]) + (" and others" if len(names) > most else "")

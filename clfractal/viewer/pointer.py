@@ -6,15 +6,22 @@ A place in the picture is (x, y) in pixels from its upper left corner, y down; p
 
 from __future__ import annotations
 
-from typing import TypeAlias
+from typing import TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.camera.views import View
+from clfractal.schema.base import Vector
 
 Floats: TypeAlias = npt.NDArray[np.float64]
 Size: TypeAlias = tuple[int, int]
+
+
+def vector(values: Floats) -> Vector:
+    """Three coordinates as a scene has them."""
+    x, y, z = values.tolist()
+    return x, y, z
 
 
 def ray_at(view: View, x: float, y: float, size: Size) -> tuple[Floats, Floats]:
@@ -35,8 +42,7 @@ def point_at(view: View, x: float, y: float, size: Size, depth: float) -> Floats
     """The point, shape (3,), that a place of the picture shows at a finite depth."""
     origin, direction = ray_at(view, x, y, size)
     along = depth - (origin - view.origin) @ view.axis
-    found: Floats = origin + direction * (along / (direction @ view.axis))
-    return found
+    return cast(Floats, origin + direction * (along / (direction @ view.axis)))
 
 
 def project(view: View, point: npt.ArrayLike, size: Size) -> tuple[float, float, float]:

@@ -81,8 +81,7 @@ def rotation(axis: npt.ArrayLike, angle: float) -> Floats:
     x, y, z = np.asarray(axis, float)
     across = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     # 1 - cos as a square keeps its digits at small angles.
-    found: Floats = np.eye(3) + np.sin(angle) * across + 2 * np.sin(angle / 2) ** 2 * (across @ across)
-    return found
+    return cast(Floats, np.eye(3) + np.sin(angle) * across + 2 * np.sin(angle / 2) ** 2 * (across @ across))
 
 
 def turned_about(camera: C, pivot: npt.ArrayLike, matrix: Floats, up: npt.ArrayLike) -> C:

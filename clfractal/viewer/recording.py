@@ -7,7 +7,8 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -95,10 +96,8 @@ class Recorder:
         self.path = path
         self._last = 0.0
         self._flushed = 0.0
-        try:
+        with self._writing():
             self._file = open(path, "w", encoding="utf-8")  # noqa: SIM115 (closed by `close`)
-        except (OSError, ValueError) as error:
-            raise file_error(path, "cannot be written", error) from error
         self._write({"format": _FORMAT, "version": VERSION, "size": list(size)}, flush=True)
 
     def __enter__(self) -> Self:
@@ -131,17 +130,20 @@ class Recorder:
         Raises:
             FileError: the last events cannot be written.
         """
-        try:
+        with self._writing():
             self._file.close()
-        except OSError as error:
-            raise file_error(self.path, "cannot be written", error) from error
 
     def _write(self, line: Mapping[str, Any], *, flush: bool) -> None:
-        try:
+        with self._writing():
             self._file.write(json.dumps(line, allow_nan=False) + "\n")
             if flush:
                 self._file.flush()
-        except OSError as error:
+
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        try:
+            yield
+        except (OSError, ValueError) as error:
             raise file_error(self.path, "cannot be written", error) from error
 
 
@@ -176,9 +178,7 @@ def read_recording(path: str | Path) -> Recording:
     Raises:
         FileError: it cannot be read, is no recording, or has a wrong line, which is named.
     """
-    text = read_text_file(Path(path), limit=_MOST_BYTES)
-    lines = text.split("\n")
-    whole, rest = lines[:-1], lines[-1]
+    *whole, rest = read_text_file(Path(path), limit=_MOST_BYTES).split("\n")
     if rest and _is_json(rest):
         whole.append(rest)
     if not whole:

@@ -78,7 +78,7 @@ def save_scene(
         files.undo()
         raise
     if inline:
-        files.undo_formulas()
+        files.undo(formulas=True)
     return SceneSource("scene", target, text, saved.placed(folder) if elsewhere else saved)
 
 

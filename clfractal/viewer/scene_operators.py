@@ -4,19 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from clfractal.errors import ClfractalError
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
-from clfractal.scene.rectangle import Plane
+from clfractal.scene.rectangle import Axis, Plane
 from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.stereo import Mode
 from clfractal.schema.base import Vector
 from clfractal.viewer import navigation, plane_moves, standard_views, zoom_box
 from clfractal.viewer.aim import Aim
 from clfractal.viewer.controls import Controls
+from clfractal.viewer.editing import plain
 from clfractal.viewer.motion import Motion
 from clfractal.viewer.studio import Studio
 
@@ -75,23 +77,19 @@ class SceneOperators:
             "redo_camera": lambda: self._undo("camera", self.studio.redo),
             "exposure_down": lambda: self._expose(-0.25),
             "exposure_up": lambda: self._expose(0.25),
-            "exposure_reset": self._reset_exposure,
+            "exposure_reset": lambda: self._edit({"output.exposure": self.studio.saved.output.exposure}),
             "next_renderer": self.next_renderer,
             "region": self._choose_region,
             "region_clear": lambda: self.studio.set_region(None),
         }
 
     def _cameras(self) -> dict[str, Callable[[], None]]:
-        found: dict[str, Callable[[], None]] = {}
-        ways = {"left": (-1, 0), "right": (1, 0), "up": (0, -1), "down": (0, 1)}
-        for way, (x, y) in ways.items():
-            found[f"orbit_{way}"] = lambda x=x, y=y: self._orbit(x * _STEP, y * _STEP)  # type: ignore[misc]
-            found[f"pan_{way}"] = lambda x=x, y=y: self._pan(x * _STEP, y * _STEP)  # type: ignore[misc]
-        for side in standard_views.SIDES:
-            found[f"view_{side}"] = lambda side=side: self._view(side)  # type: ignore[misc]
-        for number in range(1, 10):
-            found[f"bookmark_{number}"] = lambda number=number: self.go_to_bookmark(number)  # type: ignore[misc]
-        return found | {
+        ways = {"left": (-_STEP, 0), "right": (_STEP, 0), "up": (0, -_STEP), "down": (0, _STEP)}
+        return {
+            **{f"orbit_{way}": partial(self._orbit, *by) for way, by in ways.items()},
+            **{f"pan_{way}": partial(self._pan, *by) for way, by in ways.items()},
+            **{f"view_{side}": partial(self._view, side) for side in standard_views.SIDES},
+            **{f"bookmark_{number}": partial(self.go_to_bookmark, number) for number in range(1, 10)},
             "zoom_in": lambda: self._zoom(_ZOOM),
             "zoom_out": lambda: self._zoom(1 / _ZOOM),
             "level": lambda: self._camera(navigation.levelled(self.studio.scene.camera)),
@@ -104,7 +102,6 @@ class SceneOperators:
         }
 
     def _planes(self) -> dict[str, Callable[[], None]]:
-        found: dict[str, Callable[[], None]] = {}
         moves: dict[str, tuple[float, float, float]] = {
             "move_out": (1, 0, 0),
             "move_in": (-1, 0, 0),
@@ -113,9 +110,7 @@ class SceneOperators:
             "move_up": (0, 0, 1),
             "move_down": (0, 0, -1),
         }
-        for name, (normal, side, up) in moves.items():
-            found[name] = lambda way=(normal, side, up): self._move(*way)  # type: ignore[misc]
-        turns = {
+        turns: dict[str, tuple[Axis, float]] = {
             "turn_left": ("up", -_TURN),
             "turn_right": ("up", _TURN),
             "turn_up": ("side", -_TURN),
@@ -123,11 +118,9 @@ class SceneOperators:
             "spin_left": ("normal", _TURN),
             "spin_right": ("normal", -_TURN),
         }
-        for name, (axis, angle) in turns.items():
-            found[name] = lambda axis=axis, angle=angle: self._plane(  # type: ignore[misc]
-                lambda plane: plane_moves.rotate_in_place(plane, axis, angle)
-            )
-        return found | {
+        return {
+            **{name: partial(self._move, *way) for name, way in moves.items()},
+            **{name: partial(self._turn, *turn) for name, turn in turns.items()},
             "larger": lambda: self._scale(1 / _ZOOM),
             "smaller": lambda: self._scale(_ZOOM),
             "cut": self._cut,
@@ -156,14 +149,12 @@ class SceneOperators:
         self.motion.go_to(camera, self.now())
 
     def _orbit(self, dx: float, dy: float) -> None:
-        camera = self.motion.target
-        size = self.studio.viewport
-        style = self.controls.settings.orbit
+        camera, style = self.motion.target, self.controls.settings.orbit
         vertical = self.studio.saved.camera.up if style == "turntable" else None
         aim = None if self.motion.active else self.aim()
         if aim is not None and aim.camera_path == "camera":
             self._pivot = aim.pivot  # while the camera moves, steps that follow are about the same point
-        pivot = self._pivot or camera.target
+        pivot, size = self._pivot or camera.target, self.studio.viewport
         self._camera(navigation.orbit(camera, pivot, -dx, -dy, size, style, vertical=vertical))
 
     def _pan(self, dx: float, dy: float) -> None:
@@ -173,8 +164,8 @@ class SceneOperators:
         aim = self.aim()
         if aim is not None and aim.plane is not None:
             self._plane(lambda plane: plane_moves.scale(plane, factor))
-            return
-        self._camera(navigation.dolly(self.motion.target, factor))
+        else:
+            self._camera(navigation.dolly(self.motion.target, factor))
 
     def _view(self, side: standard_views.Side) -> None:
         studio = self.studio
@@ -233,11 +224,11 @@ class SceneOperators:
 
     def go_to_bookmark(self, number: int) -> None:
         """Moves the camera to a bookmark, counted from 1 in their order."""
-        marks = list(self.studio.scene.bookmarks.items())
+        marks = list(self.studio.scene.bookmarks.values())
         if number > len(marks):
             self.studio.tell(f"there is no bookmark {number}", wrong=True)
-            return
-        self._camera(marks[number - 1][1])
+        else:
+            self._camera(marks[number - 1])
 
     # Planes, zooms
 
@@ -269,6 +260,9 @@ class SceneOperators:
             return plane_moves.shift(plane, normal=normal * step, side=side * step, up=up * step)
 
         self._plane(moved)
+
+    def _turn(self, axis: Axis, angle: float) -> None:
+        self._plane(lambda plane: plane_moves.rotate_in_place(plane, axis, angle))
 
     def _scale(self, factor: float) -> None:
         box = self.controls.box
@@ -308,17 +302,15 @@ class SceneOperators:
             return
         words = list(RENDERERS)
         kind = words[(words.index(scene.renderer.type) + 1) % len(words)]
-        other = RENDERERS[kind]
-        changes: dict[str, Any] = {
-            "renderer": {"type": kind, "samples": scene.renderer.samples, **other.first}
-        }
+        other, samples = RENDERERS[kind], scene.renderer.samples
+        changes: dict[str, Any] = {"renderer": {"type": kind, "samples": samples, **other.first}}
         if other.has_own_colors and scene.coloring.uses_palette:
             changes["coloring.by"] = "solid"
         if other.is_flat:
             changes["cut_planes"] = []
         shown = {name: each for name, each in scene.objects.items() if can_show(kind, each.tag)}
         if len(shown) < len(scene.objects):
-            changes["objects"] = {name: each.model_dump(mode="json") for name, each in shown.items()}
+            changes["objects"] = plain(shown)
         if not self._edit(changes):
             self.studio.tell(self.studio.problems.get("renderer", "not possible"), wrong=True)
 
@@ -365,9 +357,6 @@ class SceneOperators:
 
     def _expose(self, stops: float) -> None:
         self._edit({"output.exposure": round(self.studio.exposure + stops, 3)})
-
-    def _reset_exposure(self) -> None:
-        self._edit({"output.exposure": self.studio.saved.output.exposure})
 
     def _undo(self, kind: Any, how: Callable[[Any], bool]) -> None:
         self.motion.stop()

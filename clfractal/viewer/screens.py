@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from clfractal.images.modes import BELOW, BESIDE
-from clfractal.scene.stereo import APART, Stereo
+from clfractal.images.modes import BELOW
+from clfractal.scene.stereo import Stereo
 from clfractal.viewer import gl, window
 from clfractal.viewer.cables import Cables
 from clfractal.viewer.chart import mixed_chart
@@ -18,6 +18,7 @@ from clfractal.viewer.ui_renderer import UiRenderer
 from clfractal.viewer.window import Monitor, Window
 from clfractal.viewer.window_options import Options
 from clfractal.viewer.window_picture import Surface
+from clfractal.viewer.window_places import places_of
 
 
 class Outputs:
@@ -70,11 +71,10 @@ class Outputs:
 
     def span(self) -> None:
         """One borderless window over all chosen monitors (all there are, if none were chosen), or goes back."""
+        wanted = self.monitors or window.monitors()
         if self.first.fullscreen:
             self._unfill()
-            return
-        wanted = self.monitors or window.monitors()
-        if wanted:
+        elif wanted:
             self._fill(self.first, wanted)
 
     def open_second(self) -> None:
@@ -219,13 +219,12 @@ class Outputs:
             height -= self._below
             wide, high = surface.size
             part, smooth = surface.part, surface.coarse and surface.smooth
+            place = (0, self._below, width, height)
             # A picture is at most a pixel smaller than its window, where halves need even sizes.
-            if 0 <= width - wide <= 1 and 0 <= height - high <= 1:
-                self._rectangle.draw(
-                    surface.texture, (0, self._below + height - high, wide, high), part, smooth=smooth
-                )
-            else:
-                self._rectangle.draw(surface.texture, (0, self._below, width, height), part, smooth=True)
+            fits = 0 <= width - wide <= 1 and 0 <= height - high <= 1
+            if fits:
+                place = (0, self._below + height - high, wide, high)
+            self._rectangle.draw(surface.texture, place, part, smooth=smooth or not fits)
         draw_ui(None)
 
     def _draw_half(
@@ -245,27 +244,18 @@ class Outputs:
 
     def _draw_charts(self, surface: Surface, width: int, height: int) -> None:
         stereo = surface.shown.look.stereo if surface.shown is not None else None
-        mode = stereo.mode if stereo is not None else "left"
-        if mode in BESIDE or mode in APART:
-            half = width // 2
-            for number, eye in enumerate(("left", "right")):
-                self._rectangle.draw(self._chart(half, height, eye), (number * half, 0, half, height))
-        elif mode in BELOW:
-            half = height // 2
-            for number, eye in enumerate(("left", "right")):
-                place = (0, height - (number + 1) * half, width, half)
-                self._rectangle.draw(self._chart(width, half, eye), place)
-        else:
-            self._rectangle.draw(self._chart(width, height, mode), (0, 0, width, height))
+        places = places_of(stereo, (width, height)).ui
+        eyes = ("left", "right") if len(places) > 1 else (stereo.mode if stereo is not None else "left",)
+        for eye, place in zip(eyes, places, strict=True):
+            self._rectangle.draw(self._chart(*place[2:], eye), place)
 
     def _chart(self, width: int, height: int, eye: Any) -> int:
         key = (width, height, eye)
         if key not in self._charts:
             while len(self._charts) > 3:
                 gl.delete_texture(self._charts.pop(next(iter(self._charts))))
-            texture = gl.new_texture(width, height)
-            gl.fill_texture(texture, mixed_chart((width, height), eye))
-            self._charts[key] = texture
+            self._charts[key] = gl.new_texture(width, height)
+            gl.fill_texture(self._charts[key], mixed_chart((width, height), eye))
         return self._charts[key]
 
     def read(self, *, picture: bool = False) -> Any:

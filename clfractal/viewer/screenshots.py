@@ -5,12 +5,12 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from clfractal.errors import ClfractalError
 from clfractal.files.png import SCENE_KEY, write_png_pixels
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
@@ -70,11 +70,9 @@ class Screenshots:
         """
         wanted, self._next = self._next, []
         for target, panels in wanted:
-            try:
+            with studio.telling():
                 write_screenshot(target, drawn.whole() if panels else drawn.picture(), studio.shown_scene)
-                studio.tell(f"saved {_shown(target)}")
-            except ClfractalError as error:
-                studio.tell(str(error), wrong=True)
+                studio.tell(f"saved {target.name if target.parent == Path.cwd() else target}")
         return self.wanted is not None and self._waits(drawn, studio, self.wanted)
 
     def _waits(self, drawn: Drawn, studio: Studio, target: Path) -> bool:
@@ -101,13 +99,9 @@ def free_name(source: SceneSource, ending: str, taken: list[Path] | None = None)
     Args:
         taken: names that others will have.
     """
-    stem = source.path.stem if source.path is not None else "scene"
-    folder, number = _folder(source), 1
-    while True:
-        found = folder / f"{stem}-{number:03}.{ending}"
-        if not os.path.lexists(found) and found not in (taken or ()):
-            return found
-        number += 1
+    stem, folder = source.path.stem if source.path is not None else "scene", _folder(source)
+    names = (folder / f"{stem}-{number:03}.{ending}" for number in count(1))
+    return next(each for each in names if not os.path.lexists(each) and each not in (taken or ()))
 
 
 def write_screenshot(target: Path, pixels: Any, scene: Scene) -> None:
@@ -125,8 +119,3 @@ def _folder(source: SceneSource) -> Path:
         return Path.cwd()
     folder = source.path.absolute().parent
     return folder if os.access(folder, os.W_OK) else Path.cwd()
-
-
-def _shown(target: Path) -> str:
-    """A file's name, with its folder unless that is the current one."""
-    return target.name if target.parent == Path.cwd() else str(target)

@@ -295,10 +295,8 @@ class Session:
             return None
         followed = replace(old, scene=seen, moving=True, region=None)
         with self._executors.waiting(False):
-            for plain in (
-                False,
-                True,
-            ):  # its draft may not have been prepared; or the picture itself is no longer there
+            for plain in (False, True):
+                # Its draft may not have been prepared; or the picture itself is no longer there.
                 with suppress(NotReady):
                     return self._begun(followed, token, old=True, plain=plain)
         self._gathered = before
@@ -456,8 +454,7 @@ class Session:
         work.ranges.pop(0)
         seconds = state.seconds
         work.seconds += seconds
-        work.samples = samples[1]
-        work.prepared = True
+        work.samples, work.prepared = samples[1], True
         if samples[0] == 0:
             foreseen = self._drafts.foreseen(work.wanted.scene, self._prepared)
             if foreseen is not None:

@@ -133,7 +133,7 @@ def _parts(group: Sequence[Path], plain: dict[str, Any], tracks: Sequence[Path])
 
 def _tie(group: Sequence[Path], old: dict[str, Any], new: dict[str, Any], wanted: dict[Path, Any]) -> None:
     """Finds which places of a group have to change, too: those that were equal to a changed one, and have not changed."""
-    there = [path for path in group if _get(new, path) is not _NONE and not _shifted(old, new, path)]
+    there = [path for path in group if _get(new, path) is not _NONE and _shifted(old, new, path) is None]
     before = {path: _get(old, path) for path in there}
     changed = [
         path for path in there if before[path] is not _NONE and not same(before[path], _get(new, path))
@@ -144,24 +144,23 @@ def _tie(group: Sequence[Path], old: dict[str, Any], new: dict[str, Any], wanted
             wanted[path] = copy.deepcopy(_get(new, like))
 
 
-def _shifted(old: dict[str, Any], new: dict[str, Any], path: Path) -> bool:
-    """Whether a list on the way has another length than before: its entries may be others."""
+def _shifted(old: dict[str, Any], new: dict[str, Any], path: Path) -> int | None:
+    """Where on the way a list has another length than before: its entries may be others; None: nowhere."""
     for end in range(1, len(path)):
         one, other = _get(old, path[:end]), _get(new, path[:end])
         if isinstance(one, list) and isinstance(other, list) and len(one) != len(other):
-            return True
-    return False
+            return end
+    return None
 
 
 def _moved(old: dict[str, Any], new: dict[str, Any], path: Path) -> Path:
     """Where an entry of a list that has become longer or shorter is now; the same place if it is gone."""
-    for end in range(1, len(path)):
-        one, other = _get(old, path[:end]), _get(new, path[:end])
-        if isinstance(one, list) and isinstance(other, list) and len(one) != len(other):
-            entry = _get(one, path[end : end + 1])
-            place = next((n for n, each in enumerate(other) if same(each, entry)), None)
-            return path if place is None else (*path[:end], str(place), *path[end + 1 :])
-    return path
+    end = _shifted(old, new, path)
+    if end is None:
+        return path
+    entry, there = _get(old, path[: end + 1]), _get(new, path[:end])
+    place = next((n for n, each in enumerate(there) if same(each, entry)), None)
+    return path if place is None else (*path[:end], str(place), *path[end + 1 :])
 
 
 def _get(value: Any, path: Path) -> Any:

@@ -9,13 +9,13 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
-import numpy as np
-
 from clfractal.engine import thumbnails
 from clfractal.engine.thumbnails import Pixels
 from clfractal.errors import ClfractalError
 from clfractal.scene.load import load_scene, read_text
 from clfractal.scene.model import Scene
+from clfractal.viewer.background import opaque
+from clfractal.viewer.preparing import internal_error
 
 
 @dataclass(slots=True, eq=False)
@@ -105,15 +105,14 @@ class Shelf:
         except ClfractalError as error:
             entry.problem = error.message
         except Exception as error:  # the others can be shown
-            entry.problem = f"internal error, please report it: {type(error).__name__}: {error}"
+            entry.problem = internal_error(error).message
         self.woken()
 
     def _find(self, entry: Entry, scene: Scene) -> None:
         key = thumbnails.key_of(scene, self.device)
         found = thumbnails.load(key)
         if found is not None:
-            opaque = np.full((*found.shape[:2], 1), 255, np.uint8)
-            entry.pixels = np.concatenate([found, opaque], axis=-1)
+            entry.pixels = opaque(found)
         entry.key = key
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -70,11 +71,10 @@ class Sight:
         if self.depths is None or not 0 <= x < self.size[0] or not 0 <= y < self.size[1]:
             return float("inf")
         rows, columns = self.depths.shape
-        ends = [
+        (left, top), (right, bottom) = (
             np.clip((np.array([x, y]) + sign * radius) / self.divider, 0, (columns - 1, rows - 1)).astype(int)
             for sign in (-1, 1)
-        ]
-        (left, top), (right, bottom) = ends
+        )
         across = (np.arange(left, right + 1) + 0.5) * self.divider - x
         down = (np.arange(top, bottom + 1) + 0.5) * self.divider - y
         # A coarse pixel counts if any of it may lie in the disc.
@@ -103,8 +103,7 @@ class Sight:
         ahead = self.nearest(x, y, radius)
         if not isfinite(ahead):
             depth = self.usual_depth
-            return point_at(self.view, x, y, self.size, depth), radius * self.pixel(depth)
-        if self.view.eye is None:
+        elif self.view.eye is None:
             depth = ahead - radius * self.pixel(ahead)
         else:
             # depth + radius = ahead, of which the radius grows with the depth.
@@ -128,8 +127,7 @@ class Sight:
         if 0 <= x <= self.size[0] and 0 <= y <= self.size[1] and self._from_eye(depth) > 0:
             return middle
         seen = self.points((0.0, 0.0, float(self.size[0]), float(self.size[1])))
-        found: Floats = seen.mean(axis=0) if len(seen) else middle
-        return found
+        return cast(Floats, seen.mean(axis=0) if len(seen) else middle)
 
     def pivot(self) -> Floats:
         """What is turned about where the pointer shows nothing: what is at the picture's middle, else `center`."""
@@ -173,10 +171,8 @@ class Sight:
         x = max(self.middle[0] - aside, left + _RIM * (right - left))
         y = max(self.middle[1] - aside, top + _RIM * (bottom - top))
         for _ in range(20):
-            shorter = _TOWARDS * self._from_eye(depth)
-            if self.view.eye is None:
-                shorter = _TOWARDS * self.pixel(depth) * self.size[1]
-            depth -= shorter
+            away = self._from_eye(depth) if self.view.eye is not None else self.pixel(depth) * self.size[1]
+            depth -= _TOWARDS * away
             if depth < self.nearest(x, y, _RIM * self.size[1]):
                 break
         return point_at(self.view, x, y, self.size, depth), point

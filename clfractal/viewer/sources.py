@@ -6,6 +6,7 @@ import os
 import re
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import count
 from pathlib import Path
 from typing import Any, Literal
 
@@ -123,11 +124,8 @@ def suggested_name(source: SceneSource, folder: Path) -> Path:
         found = re.fullmatch(r"(.+?)(?:-(\d{1,6}))?", source.path.stem)
         if found is not None:
             stem, number = found[1], int(found[2] or 1) + 1
-    while True:
-        path = folder / (f"{stem}-{number}.yaml" if number > 1 else f"{stem}.yaml")
-        if not os.path.lexists(path):
-            return path
-        number += 1
+    names = (f"{stem}-{each}.yaml" if each > 1 else f"{stem}.yaml" for each in count(number))
+    return next(folder / name for name in names if not os.path.lexists(folder / name))
 
 
 def is_picture(path: Path) -> bool:

@@ -5,19 +5,14 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.files.fragments import same
-from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 
 # The kinds of camera, renderer, light and lighting that a section without its word for them has.
 USUAL_KINDS = frozenset(("perspective", "surface", "directional", "direct"))
 
 
-def without_defaults(scene: Scene) -> dict[str, Any]:
-    """Plain data that load to an equal scene; formulas that came from files are `inline`."""
-    return _section(scene)
-
-
-def _section(section: Section) -> dict[str, Any]:
+def without_defaults(section: Section) -> dict[str, Any]:
+    """Plain data that load to an equal scene, or section; formulas that came from files are `inline`."""
     found: dict[str, Any] = {}
     for name, field in type(section).model_fields.items():
         value = getattr(section, name)
@@ -28,17 +23,14 @@ def _section(section: Section) -> dict[str, Any]:
                     continue
             elif same(short, _short(field.get_default(call_default_factory=True))):
                 continue
-        if name in ("type", "projection"):
-            # The word that says which kind it is, as everybody writes it: in front.
-            found = {name: short, **found}
-        else:
-            found[name] = short
+        # The word that says which kind it is stands in front, as everybody writes it.
+        found = {name: short, **found} if name in ("type", "projection") else {**found, name: short}
     return found
 
 
 def _short(value: Any) -> Any:
     if isinstance(value, Section):
-        return _section(value)
+        return without_defaults(value)
     if isinstance(value, dict):
         return {key: _short(child) for key, child in value.items()}
     if isinstance(value, (tuple, list)):

@@ -23,11 +23,10 @@ class Meter:
 
     def shown(self, shown: Shown | None, now: float) -> None:
         """A frame has arrived and is drawn next."""
-        if shown is None:
-            return
-        if self._shown is None or self._shown.frame is not shown.frame:
-            self._arrived.append(now)
-        self._shown = shown
+        if shown is not None:
+            if self._shown is None or self._shown.frame is not shown.frame:
+                self._arrived.append(now)
+            self._shown = shown
 
     def swapped(self, now: float) -> None:
         """What was drawn is on the screen."""
@@ -38,11 +37,8 @@ class Meter:
     def speed(self) -> Speed:
         """The newest figures."""
         times = self._arrived
-        frames = 0.0
-        moving = len(times) > 2 and time.perf_counter() - times[-1] < 0.5
-        if moving and times[-1] > times[0]:
-            frames = (len(times) - 1) / (times[-1] - times[0])
-        return Speed(frames)
+        moving = len(times) > 2 and time.perf_counter() - times[-1] < 0.5 and times[-1] > times[0]
+        return Speed((len(times) - 1) / (times[-1] - times[0]) if moving else 0.0)
 
     def nearest(self, shown: Shown | None) -> float:
         """Depth of the nearest surface in the picture, scene units; infinite if none is in sight."""

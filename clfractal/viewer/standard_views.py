@@ -10,7 +10,7 @@ import numpy.typing as npt
 from clfractal.errors import SceneError
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST, Extent, framing, least_distance, room
-from clfractal.viewer.pointer import Floats, Size
+from clfractal.viewer.pointer import Size, vector
 from clfractal.viewer.pose import C, pose_of, stood
 
 Side: TypeAlias = Literal["front", "back", "left", "right", "top", "bottom"]
@@ -36,7 +36,7 @@ def frame_all(camera: C, shown: Extent, size: Size) -> C:
     """
     fov = camera.fov if isinstance(camera, PerspectiveCamera) else None
     pose = pose_of(camera)
-    along = (_plain(pose.axis), _plain(pose.side), _plain(pose.up))
+    along = (vector(pose.axis), vector(pose.side), vector(pose.up))
     position, height = framing(along, shown, size[0] / size[1], fov)
     return stood(camera, position, shown.center, **({} if height is None else {"height": height}))
 
@@ -48,7 +48,7 @@ def axis_view(camera: C, side: Side, size: Size, shown: Extent | None = None) ->
     Args:
         shown: what it is to show (see `frame_all`); None: target and distance stay.
     """
-    axis, up = (np.array(vector) for vector in SIDES[side])
+    axis, up = (np.array(each) for each in SIDES[side])
     middle = np.array(camera.target if shown is None else shown.center, float)
     # The old `up` may lie along the new axis, so both change at once.
     turned = stood(camera, middle - pose_of(camera).distance * axis, middle, up)
@@ -77,11 +77,11 @@ def to_orthographic(
     height = float(np.clip(height, _LEAST_HEIGHT, LARGEST))
     try:
         return OrthographicCamera(
-            position=_plain(position), target=camera.target, up=camera.up, height=height
+            position=vector(position), target=camera.target, up=camera.up, height=height
         )
     except SceneError:  # `up` was nearly along the view, and is so now
         return OrthographicCamera(
-            position=_plain(position), target=camera.target, up=_plain(pose.up), height=height
+            position=vector(position), target=camera.target, up=vector(pose.up), height=height
         )
 
 
@@ -114,11 +114,6 @@ def to_perspective(
     lens = {} if like is None else {name: getattr(like, name) for name in _LENS}
     lens["fov"] = float(np.clip(used, _LEAST_FOV, _MOST_FOV))
     try:
-        return PerspectiveCamera(position=_plain(position), target=camera.target, up=camera.up, **lens)
+        return PerspectiveCamera(position=vector(position), target=camera.target, up=camera.up, **lens)
     except SceneError:  # as above
-        return PerspectiveCamera(position=_plain(position), target=camera.target, up=_plain(pose.up), **lens)
-
-
-def _plain(vector: Floats) -> tuple[float, float, float]:
-    x, y, z = vector.tolist()
-    return x, y, z
+        return PerspectiveCamera(position=vector(position), target=camera.target, up=vector(pose.up), **lens)

@@ -121,8 +121,7 @@ class Studio(InFilm):
             tracked = isinstance(error, TrackedError)
             of_film = not tracked and (error.where.path or "").startswith("animation.")
             text = str(error) if of_film else error.message
-            for path in values:
-                self.problems[path] = text
+            self.problems |= dict.fromkeys(values, text)
             if (tracked or of_film) and gesture is None:  # no panel of what is edited has a place for it
                 paths = tuple(values)
                 self.tell(
@@ -140,18 +139,16 @@ class Studio(InFilm):
         A camera of another kind is refused, by a message, if a track moves what it does not have.
         """
         changed = self.scene.model_copy(update={"camera": camera})
-        if type(camera) is not type(self.scene.camera):
-            try:
-                check_tracked(self.scene, changed)
-            except ClfractalError as error:
-                self.tell(error.message, wrong=True)
-                return
         try:
+            if type(camera) is not type(self.scene.camera):
+                check_tracked(self.scene, changed)
             changed = self._tied(changed)
+        except TrackedError as error:
+            self.tell(error.message, wrong=True)
         except ClfractalError as error:
             self.tell(f"camera: {error}", wrong=True)
-            return
-        self._replace(changed, gesture)
+        else:
+            self._replace(changed, gesture)
 
     def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
         """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""
@@ -339,16 +336,12 @@ class Studio(InFilm):
         Args:
             holds: whether its cause is still there: the line goes with it.
         """
+        new = Message(" ".join(text.split()), wrong, time.perf_counter(), holds, self._topic)
         last = self.messages[-1] if self.messages else None
-        if (
-            last is not None
-            and last.text == " ".join(text.split())
-            and last.time > time.perf_counter() - _AGAIN
-        ):
-            return
-        self.messages.append(Message(" ".join(text.split()), wrong, time.perf_counter(), holds, self._topic))
-        del self.messages[:-MOST_MESSAGES]
-        self.woken()
+        if last is None or last.text != new.text or last.time <= new.time - _AGAIN:
+            self.messages.append(new)
+            del self.messages[:-MOST_MESSAGES]
+            self.woken()
 
     def close(self) -> None:
         """Ends all work; files that are being written become complete."""
@@ -376,18 +369,14 @@ class Studio(InFilm):
         step = self.history.next_step(kind, redo=redo)
         if step is None:
             return False
-        sections = step.after if redo else step.before
         present = self.scene
         try:
-            self._put_back(sections, step.frame)
+            self._put_back(step.after if redo else step.before, step.frame)
         except ClfractalError as error:
             # The other stack has moved on: a step of stereo does not fit an orthographic camera, for example.
             self.tell(f"this step does not fit the present scene: {error}", wrong=True)
             return True
-        if redo:
-            self.history.redo(kind)
-        else:
-            self.history.undo(kind)
+        (self.history.redo if redo else self.history.undo)(kind)
         self._shared.follow(present, self.scene, self.shared_in_text())
         self._moving_until = 0.0
         self.refresh()

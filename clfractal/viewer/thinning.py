@@ -75,12 +75,10 @@ def flight(scene: Scene, samples: Sequence[Sample], start: float, tolerance: flo
     while True:
         animation = _with_keys(scene, steady, kept, start)
         flown = _flown(scene, animation, steady, start)
-        added: list[int] = []
-        for first, end in pairwise(kept):
-            errors = {number: _error(steady[number], flown[number]) for number in range(first + 1, end)}
-            worst = max(errors, key=lambda number: errors[number], default=first)
-            if errors and errors[worst] > tolerance:
-                added.append(worst)
+        errors = [_error(recorded, found) for recorded, found in zip(steady, flown, strict=True)]
+        between = [range(first + 1, end) for first, end in pairwise(kept) if end > first + 1]
+        worst = [max(numbers, key=errors.__getitem__) for numbers in between]
+        added = [number for number in worst if errors[number] > tolerance]
         if not added:
             return animation
         kept = sorted([*kept, *added])

@@ -6,8 +6,8 @@ stays in seconds. No two keys of a track are at the same frame: a key that is pu
 
 from __future__ import annotations
 
-from bisect import bisect_left, bisect_right
-from collections.abc import Callable, Collection, Iterable, Mapping
+from bisect import bisect_left
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, Literal, TypeAlias
 
 from clfractal.errors import SceneError, Where
@@ -44,13 +44,12 @@ def clock(frame: float, fps: float) -> str:
 def frames_of_keys(animation: Animation, names: Collection[str] | None = None) -> list[float]:
     """The frames at which there are keys, rising, each once; of some tracks, or of all."""
     found: list[float] = []
-    times = sorted(
+    for time in sorted(
         animation.frame_of(key)
         for name, track in animation.tracks.items()
         if names is None or name in names
         for key in track.keys or ()
-    )
-    for time in times:
+    ):
         if not found or time - found[-1] > NEAR:
             found.append(time)
     return found
@@ -58,25 +57,18 @@ def frames_of_keys(animation: Animation, names: Collection[str] | None = None) -
 
 def key_after(animation: Animation, frame: float) -> float | None:
     """The next frame with a key behind a frame; None if there is none."""
-    times = frames_of_keys(animation)
-    place = bisect_right(times, frame + NEAR)
-    return times[place] if place < len(times) else None
+    return next((time for time in frames_of_keys(animation) if time > frame + NEAR), None)
 
 
 def key_before(animation: Animation, frame: float) -> float | None:
     """The last frame with a key before a frame; None if there is none."""
-    times = frames_of_keys(animation)
-    place = bisect_left(times, frame - NEAR)
-    return times[place - 1] if place > 0 else None
+    return max((time for time in frames_of_keys(animation) if time < frame - NEAR), default=None)
 
 
 def key_at(animation: Animation, name: str, frame: float) -> KeyAt | None:
     """The key of a track at a frame; None if there is none."""
-    track = animation.tracks.get(name)
-    for index, key in enumerate(track.keys or () if track is not None else ()):
-        if abs(animation.frame_of(key) - frame) <= NEAR:
-            return name, index
-    return None
+    found = keys_between(animation, frame, frame, [name] if name in animation.tracks else [])
+    return min(found, default=None)
 
 
 def keys_between(animation: Animation, first: float, last: float, names: Iterable[str]) -> Selection:
@@ -129,14 +121,11 @@ def with_key(animation: Animation, name: str, frame: float, value: Any) -> Anima
     place = bisect_left(times, frame)
     # As its neighbours are written, in frames or in seconds.
     like = keys[place - 1] if place > 0 else keys[0]
-    way = None
-    if place > 0 and (like.interpolation or track.interpolation) == "bezier":
+    way = like.interpolation if place > 0 else None
+    if (way or track.interpolation) == "bezier":
         way = "ease"
-        keys[place - 1] = like.model_copy(update={"interpolation": "ease", "handles": None})
-    elif place > 0:
-        way = like.interpolation
-    elif track.interpolation == "bezier":
-        way = "ease"
+        if place > 0:
+            keys[place - 1] = like.model_copy(update={"interpolation": way, "handles": None})
     made = Key(**_time(animation, frame, in_seconds=like.frame is None), value=new, interpolation=way)
     return _with_keys(animation, name, [*keys[:place], made, *keys[place:]])
 
@@ -178,8 +167,7 @@ def moved(
                 changed = _time(animation, new, in_seconds=key.frame is None)
                 key, time = key.model_copy(update={"frame": None, "time": None} | changed), new
             placed.append((time, own, key))
-        keys = _in_order(placed)
-        keys = [(own, _with_way(key, track)) for own, key in keys]
+        keys = [(own, _with_way(key, track)) for own, key in _in_order(placed)]
         tracks[name] = track.model_copy(update={"keys": tuple(key for _, key in keys)})
         chosen |= {(name, index) for index, (own, _) in enumerate(keys) if own}
     return animation.model_copy(update={"tracks": tracks}), frozenset(chosen)
@@ -193,10 +181,9 @@ def shifted(
     Args:
         whole: each goes to the nearest whole frame.
     """
-    times = [_frame(animation, key) for key in selection]
-    if not times:
+    if not selection:
         return animation, selection
-    step = max(frames, -min(times))
+    step = max(frames, -min(animation.frame_of(key_of(animation, at)) for at in selection))
     return moved(animation, selection, lambda time: _snapped(time + step, whole))
 
 
@@ -234,17 +221,13 @@ def with_way(animation: Animation, selection: Selection, word: Interpolation | N
     return animation
 
 
-def with_handles(animation: Animation, at: KeyAt, handles: tuple[float, float, float, float]) -> Animation:
+def with_handles(animation: Animation, at: KeyAt, handles: Sequence[float]) -> Animation:
     """A key with other handles of its Bezier curve; times are kept within the way, values within -10 and 10."""
-    x1, y1, x2, y2 = handles
-    inside = (_within(x1, 0, 1), _within(y1, -10, 10), _within(x2, 0, 1), _within(y2, -10, 10))
-    track = animation.tracks[at[0]]
-    word = (
-        None if track.interpolation == "bezier" and key_of(animation, at).interpolation is None else "bezier"
-    )
-    return _with_key_changed(
-        animation, at, {"interpolation": word, "handles": tuple(round(each, 4) for each in inside)}
-    )
+    bounds = ((0, 1), (-10, 10), (0, 1), (-10, 10))
+    inside = tuple(round(min(max(x, low), high), 4) for x, (low, high) in zip(handles, bounds, strict=True))
+    of_track = animation.tracks[at[0]].interpolation == "bezier"
+    word = None if of_track and key_of(animation, at).interpolation is None else "bezier"
+    return _with_key_changed(animation, at, {"interpolation": word, "handles": inside})
 
 
 # Tracks
@@ -256,24 +239,18 @@ def with_track(animation: Animation, name: str, changes: Mapping[str, Any]) -> A
     Raises:
         SceneError: they do not fit each other.
     """
-    track = animation.tracks[name]
-    word = changes.get("interpolation", track.interpolation)
-    if word == "bezier" != track.interpolation:
-        ease = _HANDLES.get(track.interpolation, EASES["ease"])
-        keys = tuple(
-            key.model_copy(update={"handles": ease})
-            if key.interpolation is None and key.handles is None
+    track, update = animation.tracks[name], dict(changes)
+    word, before = changes.get("interpolation", track.interpolation), track.interpolation
+    own = [key for key in track.keys or () if key.interpolation is None]
+    if (word == "bezier") != (before == "bezier") and own:
+        ease = _HANDLES.get(before, EASES["ease"]) if word == "bezier" else None
+        update["keys"] = tuple(
+            key.model_copy(update={"handles": (key.handles or ease) if ease else None})
+            if key.interpolation is None
             else key
             for key in track.keys or ()
         )
-        track = track.model_copy(update={"keys": keys})
-    elif word != "bezier" == track.interpolation:
-        keys = tuple(
-            key.model_copy(update={"handles": None}) if key.interpolation is None else key
-            for key in track.keys or ()
-        )
-        return _with_track(animation, name, track.model_copy(update={**changes, "keys": keys}))
-    return _with_track(animation, name, track.model_copy(update=dict(changes)))
+    return _with_track(animation, name, track.model_copy(update=update))
 
 
 def without_track(animation: Animation, name: str) -> Animation:
@@ -337,10 +314,6 @@ def key_of(animation: Animation, at: KeyAt) -> Key:
     return keys[at[1]]
 
 
-def _frame(animation: Animation, at: KeyAt) -> float:
-    return animation.frame_of(key_of(animation, at))
-
-
 def _valued(value: Any) -> Any:
     return tuple(map(float, value)) if isinstance(value, (list, tuple)) else float(value)
 
@@ -359,10 +332,6 @@ def _tidy(frame: float) -> float:
 
 def _snapped(frame: float, whole: bool) -> float:
     return float(int(frame + 0.5)) if whole else frame
-
-
-def _within(value: float, low: float, high: float) -> float:
-    return min(max(value, low), high)
 
 
 def _in_order(placed: list[tuple[float, bool, Key]]) -> list[tuple[bool, Key]]:

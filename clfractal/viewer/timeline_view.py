@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, MutableMapping
 from dataclasses import dataclass, field
 from math import ceil, floor, log10
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, cast
 
 from clfractal.errors import ClfractalError
 from clfractal.scene.animation import Animation
@@ -92,13 +92,10 @@ class TimelineView:
         """The drag has come so far: `edit` makes of the animation at its beginning what it is now."""
         if self.before is None:
             return
-        try:
+        with studio.telling():
             animation, selection = edit(self.before[0])
-        except ClfractalError as error:
-            studio.tell(str(error), wrong=True)
-            return
-        if animation == studio.scene.animation or studio.set_animation(animation, gesture="timeline"):
-            self.selection = selection
+            if animation == studio.scene.animation or studio.set_animation(animation, gesture="timeline"):
+                self.selection = selection
 
     def end(self, studio: InFilm) -> None:
         """The drag has ended."""
@@ -116,15 +113,12 @@ class TimelineView:
         animation = studio.scene.animation
         if animation is None:
             return False
-        try:
+        with studio.telling():
             new, selection = edit(animation)
-        except ClfractalError as error:
-            studio.tell(str(error), wrong=True)
-            return False
-        if not studio.set_animation(new):
-            return False
-        self.selection = selection
-        return True
+            if studio.set_animation(new):
+                self.selection = selection
+                return True
+        return False
 
     def delete(self, studio: InFilm) -> None:
         """Deletes the chosen keys."""
@@ -135,8 +129,7 @@ class TimelineView:
 
 def of(memory: MutableMapping[str, Any]) -> TimelineView:
     """The timeline of a window's panels."""
-    found: TimelineView = memory.setdefault("timeline", TimelineView())
-    return found
+    return cast(TimelineView, memory.setdefault("timeline", TimelineView()))
 
 
 # What is drawn

@@ -46,10 +46,9 @@ def _is_another(before: Any, after: Any, path: tuple[str, ...]) -> bool:
     """Whether a path leads through another entry of a list than before: entries were taken out, put in or reordered."""
     for part in path:
         if isinstance(before, tuple):
-            index = int(part)
-            if _is_moved(before, after, index):
+            if _is_moved(before, after, int(part)):
                 return True
-            before, after = before[index], after[index]
+            before, after = before[int(part)], after[int(part)]
         elif isinstance(before, Section) and isinstance(after, Section):
             before, after = getattr(before, part, None), getattr(after, part, None)
         else:

@@ -46,11 +46,9 @@ def render_key(scene: Scene) -> Scene:
     """The scene without what only concerns showing and saving: pictures of scenes with equal keys have the same rays."""
     # (An exposure that has to be measured is measured with the picture.)
     exposure = scene.output.exposure if isinstance(scene.output.exposure, str) else 0.0
-    update: dict[str, object] = {"output": Output.model_validate({"exposure": exposure})}
+    update: dict[str, object] = {"output": Output.model_validate({"exposure": exposure}), "bookmarks": {}}
     if scene.animation is not None and (scene.animation.frame is None or scene.animation.shutter == 0):
         update["animation"] = None  # only a shutter makes it a part of the picture
-    if "bookmarks" in Scene.model_fields:
-        update["bookmarks"] = {}
     if scene.stereo is not None:
         plain = Stereo.model_validate({})
         shown = {name: getattr(plain, name) for name in ("swap", "method", "glasses", "colors")}

@@ -78,10 +78,9 @@ def monitors() -> list[Monitor]:
         x, y = glfw.get_monitor_pos(each)
         wide, _ = glfw.get_monitor_physical_size(each)
         found.append((x, y, _text(glfw.get_monitor_name(each)), mode.size.width, mode.size.height, wide))
-    found.sort()
     return [
         Monitor(number, name, x, y, width, height, 1e-3 * wide)
-        for number, (x, y, name, width, height, wide) in enumerate(found, start=1)
+        for number, (x, y, name, width, height, wide) in enumerate(sorted(found), start=1)
     ]
 
 
@@ -145,48 +144,19 @@ class Window:
 
     def _listen(self) -> None:
         window, tell = self.handle, self.on_event
-
-        def key(_: Any, key: int, scancode: int, action: int, mods: int) -> None:
-            tell(Event("key", (key, scancode, action, mods)))
-
-        def char(_: Any, code: int) -> None:
-            tell(Event("char", (code,)))
-
-        def button(_: Any, button: int, action: int, mods: int) -> None:
-            tell(Event("button", (button, action, mods)))
-
-        def move(_: Any, x: float, y: float) -> None:
-            tell(Event("move", (x, y)))
-
-        def scroll(_: Any, dx: float, dy: float) -> None:
-            tell(Event("scroll", (dx, dy)))
-
-        def resize(_: Any, width: int, height: int) -> None:
-            tell(Event("resize", (width, height)))
-
-        def focus(_: Any, focused: int) -> None:
-            tell(Event("focus", (int(bool(focused)),)))
-
-        def enter(_: Any, entered: int) -> None:
-            if not entered:
-                tell(Event("leave", ()))
-
-        def drop(_: Any, paths: Sequence[str]) -> None:
-            tell(Event("drop", tuple(str(path) for path in paths)))
-
-        def refresh(_: Any) -> None:
-            tell(Event("refresh", ()))
-
-        glfw.set_key_callback(window, key)
-        glfw.set_char_callback(window, char)
-        glfw.set_mouse_button_callback(window, button)
-        glfw.set_cursor_pos_callback(window, move)
-        glfw.set_scroll_callback(window, scroll)
-        glfw.set_framebuffer_size_callback(window, resize)
-        glfw.set_window_focus_callback(window, focus)
-        glfw.set_cursor_enter_callback(window, enter)
-        glfw.set_drop_callback(window, drop)
-        glfw.set_window_refresh_callback(window, refresh)
+        for listen, kind in (
+            (glfw.set_key_callback, "key"),
+            (glfw.set_char_callback, "char"),
+            (glfw.set_mouse_button_callback, "button"),
+            (glfw.set_cursor_pos_callback, "move"),
+            (glfw.set_scroll_callback, "scroll"),
+            (glfw.set_framebuffer_size_callback, "resize"),
+            (glfw.set_window_refresh_callback, "refresh"),
+        ):
+            listen(window, lambda _, *values, kind=kind: tell(Event(kind, values)))
+        glfw.set_window_focus_callback(window, lambda _, on: tell(Event("focus", (int(bool(on)),))))
+        glfw.set_cursor_enter_callback(window, lambda _, entered: entered or tell(Event("leave")))
+        glfw.set_drop_callback(window, lambda _, paths: tell(Event("drop", tuple(map(str, paths)))))
 
     def use(self) -> None:
         """Makes its OpenGL context current."""
@@ -287,10 +257,8 @@ class Window:
         )
         if len(wanted) == 1 and _platform_is_wayland():
             # There a window has no place of its own.
-            found = _handle_of(wanted[0])
-            glfw.set_window_monitor(
-                self.handle, found, 0, 0, wanted[0].width, wanted[0].height, glfw.DONT_CARE
-            )
+            size = (wanted[0].width, wanted[0].height)
+            glfw.set_window_monitor(self.handle, _handle_of(wanted[0]), 0, 0, *size, glfw.DONT_CARE)
             return
         glfw.set_window_attrib(self.handle, glfw.DECORATED, False)
         glfw.set_window_attrib(self.handle, glfw.FLOATING, True)
@@ -314,11 +282,6 @@ class Window:
         if bool(glfw.get_window_attrib(self.handle, glfw.VISIBLE)) != shown:
             (glfw.show_window if shown else glfw.hide_window)(self.handle)
 
-    def pointer(self) -> tuple[float, float]:
-        """The pointer's place, screen coordinates from the window's top left."""
-        x, y = glfw.get_cursor_pos(self.handle)
-        return float(x), float(y)
-
     def hide_pointer(self, hidden: bool) -> None:
         """While flying the pointer is neither shown nor stopped by rims."""
         glfw.set_input_mode(self.handle, glfw.CURSOR, glfw.CURSOR_DISABLED if hidden else glfw.CURSOR_NORMAL)
@@ -333,10 +296,8 @@ class Window:
 
 
 def _handle_of(wanted: Monitor) -> Any:
-    for each in glfw.get_monitors():
-        if glfw.get_monitor_pos(each) == (wanted.x, wanted.y):
-            return each
-    return glfw.get_primary_monitor()
+    there = (each for each in glfw.get_monitors() if glfw.get_monitor_pos(each) == (wanted.x, wanted.y))
+    return next(there, None) or glfw.get_primary_monitor()
 
 
 def chosen_monitors(text: str) -> list[Monitor]:

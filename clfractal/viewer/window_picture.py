@@ -69,10 +69,10 @@ class Surface:
         if self.shown is None or not self.shown.reduced:
             return 0.0, 0.0, 1.0, 1.0
         # A coarse pixel is the picture's pixel at the corner of its block, so that one's middle is the texel's middle.
-        divider, ends = self.shown.frame.divider, []
-        for side, texels in zip(self.size, self.shown.target.size, strict=True):
-            ends.append(((0.5 - 0.5 / divider) / texels, ((side - 0.5) / divider + 0.5) / texels))
-        return ends[0][0], ends[1][0], ends[0][1], ends[1][1]
+        divider, (width, height) = self.shown.frame.divider, self.size
+        across, down = self.shown.target.size
+        first, right, bottom = 0.5 - 0.5 / divider, (width - 0.5) / divider, (height - 0.5) / divider
+        return first / across, first / down, (right + 0.5) / across, (bottom + 0.5) / down
 
     @property
     def smooth(self) -> bool:

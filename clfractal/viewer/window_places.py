@@ -38,17 +38,14 @@ class Places:
 def places_of(stereo: Stereo | None, framebuffer: tuple[int, int]) -> Places:
     """Where the panels of a window are: at screen depth, so at the same place of both eyes' pictures."""
     width, height = framebuffer
-    whole: Place = (0, 0, width, height)
-    if stereo is None:
-        return Places(framebuffer, (whole,), (float(width), float(height)))
-    if stereo.mode in BESIDE or stereo.mode in APART:
+    mode = stereo.mode if stereo is not None else None
+    squeezed = 2.0 if mode in ("split_half", "over_under_half") else 1.0
+    if mode in BESIDE or mode in APART:
         half = width // 2
-        squeezed = 2.0 if stereo.mode == "split_half" else 1.0
         pair: tuple[Place, ...] = ((0, 0, half, height), (half, 0, half, height))
         return Places(framebuffer, pair, (half * squeezed, float(height)))
-    if stereo.mode in BELOW:
+    if mode in BELOW:
         half = height // 2
-        squeezed = 2.0 if stereo.mode == "over_under_half" else 1.0
         pair = ((0, height - half, width, half), (0, height - 2 * half, width, half))
         return Places(framebuffer, pair, (float(width), half * squeezed))
-    return Places(framebuffer, (whole,), (float(width), float(height)))
+    return Places(framebuffer, ((0, 0, width, height),), (float(width), float(height)))

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from math import isfinite
+from typing import cast
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +19,7 @@ from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import Box, VolumeRenderer, Zoom
 from clfractal.schema.base import Vector
-from clfractal.viewer.pointer import Floats, Size, point_at, project
+from clfractal.viewer.pointer import Floats, Size, point_at, project, vector
 
 MOST_ZOOMS = 64
 LARGEST_SCALE = 1e15
@@ -95,20 +96,20 @@ def within(box: ZoomBox, stage: Stage) -> ZoomBox:
     room = 0.5 * (sides - sides / scale)
     wanted = np.array(box.center, float)
     wanted = np.where(np.isfinite(wanted), wanted, middle)
-    return ZoomBox(_vector(np.clip(wanted, middle - room, middle + room)), scale)
+    return ZoomBox(vector(np.clip(wanted, middle - room, middle + room)), scale)
 
 
 @np.errstate(all="ignore")
 def placed_at(box: ZoomBox, stage: Stage, point: npt.ArrayLike) -> ZoomBox:
     """The box, its middle at a point of the picture's space (for example the one under the pointer)."""
-    return within(replace(box, center=_vector(stage.to_formula(point))), stage)
+    return within(replace(box, center=vector(stage.to_formula(point))), stage)
 
 
 @np.errstate(all="ignore")
 def shifted(box: ZoomBox, stage: Stage, shift: npt.ArrayLike) -> ZoomBox:
     """The box, shifted by a vector of the picture's space."""
     moved = np.array(box.center) + np.asarray(shift, float) / stage.magnification
-    return within(replace(box, center=_vector(moved)), stage)
+    return within(replace(box, center=vector(moved)), stage)
 
 
 def stepped(
@@ -145,8 +146,7 @@ def edges(box: ZoomBox, stage: Stage) -> Floats:
 def box_edges(center: npt.ArrayLike, sides: npt.ArrayLike) -> Floats:
     """The 12 edges of a box along the axes: segments, shape (12, 2, 3)."""
     corners = np.asarray(center, float) + _CORNERS * np.asarray(sides, float)
-    found: Floats = corners[_EDGES]
-    return found
+    return cast(Floats, corners[_EDGES])
 
 
 def applied(renderer: VolumeRenderer, box: ZoomBox) -> tuple[Zoom, ...]:
@@ -179,8 +179,3 @@ def stepped_back(renderer: VolumeRenderer) -> tuple[tuple[Zoom, ...], ZoomBox | 
 def next_magnification(renderer: VolumeRenderer, box: ZoomBox) -> float:
     """How many times larger the first box is than the marked one (`renderer.magnification` tells it of the present)."""
     return renderer.magnification * box.scale
-
-
-def _vector(values: Floats) -> Vector:
-    x, y, z = values.tolist()
-    return x, y, z

@@ -15,7 +15,7 @@ from clfractal.errors import ClfractalError, SceneError
 from clfractal.files import resources
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.viewer.editing import differing, edited, plain_section, replaced, value_at
+from clfractal.viewer.editing import edited, replaced, value_at
 from tests.viewer.sessions import scene_of
 
 SCENES = (
@@ -289,25 +289,3 @@ def test_other_sections_are_checked_with_the_whole() -> None:
         replaced(flat, {"stereo": stereo.stereo})
     assert replaced(flat, {"material": stereo.material}) == flat
     assert replaced(scene_of(), {"formula": stereo.formula, "stereo": stereo.stereo}) == stereo
-
-
-def test_what_differs_from_the_defaults() -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
-    assert set(differing(scene)) <= {"formula.name", "formula.iterations"}
-    changed = edited(scene, {"camera.fov": 33.0, "material.ambient": 0.5, "lights.0.intensity": 2.0})
-    found = differing(changed)
-    assert found["camera.fov"][0] == 33.0
-    assert found["material.ambient"][0] == 0.5
-    assert found["lights.0.intensity"][0] == 2.0
-    assert set(differing(changed, keys=("camera",))) == {"camera.fov"}
-    for path, (value, default) in found.items():
-        assert value_at(changed, path) == value
-        assert value != default
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_differences_put_back_give_the_defaults(name: str) -> None:
-    scene = shipped(name)
-    for path, (value, _) in differing(scene).items():
-        assert value_at(scene, path) == value
-    assert plain_section(scene, "camera") == value_at(scene, "camera")

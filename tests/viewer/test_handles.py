@@ -258,14 +258,3 @@ def test_the_back_of_a_box_is_hidden_by_a_wall_through_its_middle(camera: AnyCam
     wall[:, : wall.shape[1] // 2] = 0.5
     dim = overlays.hidden(view, pixels, depths, wall, SIZE)
     np.testing.assert_array_equal(dim, (pixels[:, 0] + pixels[:, 2]) / 2 < SIZE[0] / 2 - 1e-9)
-
-
-@given(st.tuples(*[numbers(-3, 3)] * 3), numbers(0.1, 4), directions)
-def test_a_circle_is_round_and_flat(
-    center: tuple[float, float, float], radius: float, axis: tuple[float, float, float]
-) -> None:
-    around = overlays.circle(center, radius, axis)
-    away = around.reshape(-1, 3) - center
-    np.testing.assert_allclose(np.linalg.norm(away, axis=1), radius)
-    np.testing.assert_allclose(away @ np.array(axis), 0, atol=1e-12)
-    np.testing.assert_allclose(around[0, 0], around[-1, 1], atol=1e-12)

@@ -15,6 +15,7 @@ from imgui_bundle import imgui
 from clfractal.scene.animation import Animation, Track
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
+from clfractal.viewer.editing import plain
 from clfractal.viewer.panels import material, metadata, timeline_inspector
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.number_box import Scale, bar_part, moved_by, text_of, typed_number
@@ -99,7 +100,7 @@ def test_defaults_are_those_of_the_schema() -> None:
             if field.is_required():
                 assert meta.default is None
             elif not isinstance(field.default, Section) and field.default_factory is None:
-                assert meta.default == metadata.plain(field.default)
+                assert meta.default == plain(field.default)
 
 
 def test_bounds_are_those_that_validation_has() -> None:

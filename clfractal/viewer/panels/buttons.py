@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TypeVar
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.ui import Ui
@@ -14,6 +14,12 @@ T = TypeVar("T")
 
 _AROUND = 6.0
 """Points around the words of segments."""
+_PRIMARY: dict[str, theme.Rgba] = {
+    "text": theme.PANEL_SOLID,
+    "button": theme.ACCENT,
+    "button_hovered": (1.0, 0.74, 0.38, 1.0),
+    "button_active": theme.ACCENT,
+}
 
 
 def button(
@@ -35,20 +41,10 @@ def button(
     shown = f"{icon}  {text}" if icon and text else icon or text
     if width < 0:
         width = imgui.get_content_region_avail().x
-    if not enabled:
-        imgui.begin_disabled()
-    if primary:
-        bright = {
-            "button": theme.ACCENT,
-            "button_hovered": (1.0, 0.74, 0.38, 1.0),
-            "button_active": theme.ACCENT,
-        }
-        with theme.colors(text=theme.PANEL_SOLID, **bright):
-            clicked = imgui.button(shown, imgui.ImVec2(width, 0))
-    else:
+    imgui.begin_disabled(not enabled)
+    with theme.colors(**(_PRIMARY if primary else {})):
         clicked = imgui.button(shown, imgui.ImVec2(width, 0))
-    if not enabled:
-        imgui.end_disabled()
+    imgui.end_disabled()
     tip(about)
     return bool(clicked)
 
@@ -62,8 +58,7 @@ def icon_button(icon: str, about: str, *, name: str = "", on: bool = False, enab
         on: whether it is drawn as switched on.
     """
     height = imgui.get_frame_height()
-    if not enabled:
-        imgui.begin_disabled()
+    imgui.begin_disabled(not enabled)
     with (
         theme.measures(frame_padding=(0.0, 4.0)),
         theme.colors(
@@ -71,8 +66,7 @@ def icon_button(icon: str, about: str, *, name: str = "", on: bool = False, enab
         ),
     ):
         clicked = imgui.button(f"{icon}##{name or about}", imgui.ImVec2(height, 0))
-    if not enabled:
-        imgui.end_disabled()
+    imgui.end_disabled()
     tip(about)
     return bool(clicked)
 
@@ -116,16 +110,32 @@ def choose(name: str, words: Mapping[T, str], current: T, width: float) -> T | N
     opened = imgui.begin_combo(f"##{name}", words.get(current, str(current)), flags)
     if not opened:
         caret = imgui.ImVec2(corner.x + width - 16, corner.y + (height - imgui.get_font_size()) / 2)
-        alpha = imgui.get_style().alpha
-        imgui.get_window_draw_list().add_text(caret, theme.packed(theme.DIM, alpha), theme.OPENED)
-    if opened:
+        color = theme.packed(theme.DIM, imgui.get_style().alpha)
+        imgui.get_window_draw_list().add_text(caret, color, theme.OPENED)
+        return None
+    for each, text in words.items():
+        if imgui.selectable(f"{text}##{each}", each == current)[0] and each != current:
+            found = each
+        if each == current:
+            imgui.set_item_default_focus()
+    imgui.end_combo()
+    return found
+
+
+def menu(name: str, words: Mapping[T, str], current: T | None = None, none: str = "") -> T | None:
+    """A list that `imgui.open_popup` opens; the choice that was clicked.
+
+    Args:
+        none: said where there is no choice.
+    """
+    found: T | None = None
+    if imgui.begin_popup(name):
+        if not words:
+            imgui.text(none)
         for each, text in words.items():
-            clicked, _ = imgui.selectable(f"{text}##{each}", each == current)
-            if clicked and each != current:
+            if imgui.selectable(f"{text}##{each}", each == current)[0]:
                 found = each
-            if each == current:
-                imgui.set_item_default_focus()
-        imgui.end_combo()
+        imgui.end_popup()
     return found
 
 
@@ -164,43 +174,76 @@ def segments(name: str, words: Mapping[T, str], current: T, width: float) -> T |
 
 def rows_of(widths: Sequence[float], width: float) -> int:
     """The fewest rows in which words, that are so many points wide, stand whole in fields of equal width."""
-    for rows in range(1, len(widths) + 1):
-        in_row = -(-len(widths) // rows)
-        if max(widths) + _AROUND <= width / in_row:
-            return rows
-    return len(widths)
+    rows = range(1, len(widths) + 1)
+    fit = (n for n in rows if max(widths) + _AROUND <= width / -(-len(widths) // n))
+    return next(fit, len(widths))
 
 
 def text_box(ui: Ui, name: str, text: str, width: float, prompt: str = "") -> str | None:
     """A line of text; the new one when Enter was pressed or the line was left, if it is another."""
-    kept = ui.memory.get("text_box")
-    shown = kept[1] if kept is not None and kept[0] == name else text
+    kept, typed = ui.memory.get("text_box", ("", ""))
     imgui.set_next_item_width(width)
-    _, new = imgui.input_text_with_hint(f"##{name}", prompt, shown)
+    _, new = imgui.input_text_with_hint(f"##{name}", prompt, typed if kept == name else text)
     if imgui.is_item_active():
         ui.memory["text_box"] = (name, new)
-    elif kept is not None and kept[0] == name:
-        ui.memory.pop("text_box", None)
-    if imgui.is_item_deactivated_after_edit() and new != text:
-        return str(new)
-    return None
+    elif kept == name:
+        del ui.memory["text_box"]
+    return str(new) if imgui.is_item_deactivated_after_edit() and new != text else None
 
 
 def tip(text: str) -> None:
-    """A tooltip of the widget that was drawn last."""
-    if text:
-        hover(text)
-
-
-def hover(text: str) -> None:
     """A tooltip of the widget that was drawn last, also if it is switched off."""
-    if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled) and (
-        imgui.begin_tooltip()
-    ):
-        imgui.push_text_wrap_pos(280)
-        imgui.text_unformatted(text)
-        imgui.pop_text_wrap_pos()
+    flags = imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
+    if text and imgui.is_item_hovered(flags) and imgui.begin_tooltip():
+        wrapped(text, 280)
         imgui.end_tooltip()
+
+
+def wrapped(text: str, right: float = 0.0, color: theme.Rgba = theme.TEXT) -> None:
+    """A text in as many lines as it needs; they end at `right` points of the window, 0: where that ends."""
+    with theme.colors(text=color), imgui_ctx.push_text_wrap_pos(right):
+        imgui.text_unformatted(text)
+
+
+def beside(text: str, color: theme.Rgba = theme.TEXT) -> None:
+    """A text at the height of the words of widgets that it stands beside."""
+    imgui.align_text_to_frame_padding()
+    imgui.text_colored(theme.vec(color), text)
+
+
+class Line:
+    """A line of a list, drawn by hand over all of the width that is left.
+
+    Attributes:
+        clicked, hovered: by the pointer.
+        draw: the list that it is drawn with.
+    """
+
+    def __init__(self, name: str, chosen: bool | None, height: float = 0.0) -> None:
+        """Begins it.
+
+        Args:
+            chosen: whether it is marked; None: whoever draws it gives it its background.
+            height: points; 0: that of a widget.
+        """
+        self.corner, self.height = imgui.get_cursor_screen_pos(), height or imgui.get_frame_height()
+        self.wide = imgui.get_content_region_avail().x
+        self.clicked = area(f"##{name}", (self.wide, self.height))
+        self.hovered = imgui.is_item_hovered()
+        self.draw = imgui.get_window_draw_list()
+        if chosen or (self.hovered and chosen is not None):
+            back = theme.ACCENT_FAINT if chosen else theme.FRAME
+            self.draw.add_rect_filled(self.corner, self.at(self.wide, self.height), theme.packed(back), 5.0)
+
+    def at(self, x: float, y: float | None = None) -> imgui.ImVec2:
+        """A place in it, points from its corner; `y`: else its middle."""
+        return imgui.ImVec2(self.corner.x + x, self.corner.y + (self.height / 2 if y is None else y))
+
+    def write(self, x: float, text: str, color: theme.Rgba = theme.TEXT, y: float | None = None) -> None:
+        """Writes a text: from a place on, or if that is negative up to so many points before the right end."""
+        left = x if x >= 0 else self.wide + x - imgui.calc_text_size(text).x
+        top = (self.height - imgui.get_font_size()) / 2 if y is None else y
+        self.draw.add_text(self.at(left, top), theme.packed(color), text)
 
 
 def clipped(text: str, width: float) -> str:

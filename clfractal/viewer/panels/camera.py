@@ -22,19 +22,15 @@ def summary(ui: Ui) -> str:
 def draw(ui: Ui) -> None:
     """Draws the panel."""
     camera = ui.studio.scene.camera
-    width = w.row(ui, "Projection", path="camera.projection", tip="rays from one point, or parallel ones")
-    if width is not None:
-        words = {"perspective": "Perspective", "orthographic": "Parallel"}
-        if w.segments("camera.projection", words, camera.projection, width) is not None:
-            ui.act("projection")
+    words = {"perspective": "Perspective", "orthographic": "Parallel"}
+    about, path = "rays from one point, or parallel ones", "camera.projection"
+    if w.pick(ui, "Projection", words, camera.projection, path=path, tip=about) is not None:
+        ui.act("projection")
     # A hundred points of a drag move the camera by its distance from what it looks at.
-    step = 0.01 * length(minus(camera.target, camera.position))
-    places = {"step": step}
-    if isinstance(camera, PerspectiveCamera):
-        w.field(ui, "camera.fov", unit="°")
-    else:
-        w.field(ui, "camera.height")
-    w.fields(ui, "camera", ("position", "target", "up"), position=places, target=places, up={"step": 0.01})
+    places = {"step": 0.01 * length(minus(camera.target, camera.position))}
+    size = "fov" if isinstance(camera, PerspectiveCamera) else "height"
+    options = {"fov": {"unit": "°"}, "position": places, "target": places, "up": {"step": 0.01}}
+    w.fields(ui, "camera", (size, "position", "target", "up"), **options)
     _views(ui)
     if isinstance(camera, PerspectiveCamera):
         _lens(ui, camera)
@@ -44,21 +40,17 @@ def _views(ui: Ui) -> None:
     if w.filtering(ui):
         return
     w.group(ui, "Views")
-    indent = 11.0
-    wide = (imgui.get_content_region_avail().x - indent - 8) / 3
+    wide = (imgui.get_content_region_avail().x - 11.0 - 8) / 3
     for row in zip(*_VIEWS, strict=True):
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
+        w.in_labels()
         for number, side in enumerate(row):
             if number:
                 w.in_row(4)
-            if w.button(side.capitalize(), width=wide, about=_key(ui, f"view_{side}")):
-                ui.act(f"view_{side}")
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
-    if w.button("Frame all", icon=theme.EXPAND, width=wide * 1.5 + 2, about=_key(ui, "frame_all")):
-        ui.act("frame_all")
+            w.act(ui, f"view_{side}", "", "", text=side.capitalize(), width=wide)
+    w.in_labels()
+    w.act(ui, "frame_all", theme.EXPAND, "", text="Frame all", width=wide * 1.5 + 2)
     w.in_row(4)
-    if w.button("Level", width=wide * 1.5 + 2, about=_key(ui, "level")):
-        ui.act("level")
+    w.act(ui, "level", "", "", text="Level", width=wide * 1.5 + 2)
 
 
 def _lens(ui: Ui, camera: PerspectiveCamera) -> None:
@@ -77,7 +69,7 @@ def _lens(ui: Ui, camera: PerspectiveCamera) -> None:
             w.field(ui, "camera.focus_on", start=camera.measured_focus, auto="the middle")
     w.field(ui, "camera.sensor_height")
     if not w.filtering(ui):
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        w.in_labels()
         if w.button("Click what shall be sharp", icon=theme.TARGET, width=-1):
             ui.act("focus_pick")
 
@@ -87,7 +79,3 @@ def _first_f_number(camera: PerspectiveCamera) -> float:
     wanted = camera.used_focus_distance / 50
     open_lens = camera.model_copy(update={"f_number": 1.0}).lens_radius * 2
     return float(f"{min(max(open_lens / wanted, 0.01), 1e6):.2g}")
-
-
-def _key(ui: Ui, action: str) -> str:
-    return ui.keys.hint(action)

@@ -89,10 +89,10 @@ def spinner(ui: Ui, x: float, y: float, radius: float = 9.0) -> None:
 
 def _rim(corner: imgui.ImVec2, far: imgui.ImVec2, chosen: bool, hovered: bool) -> None:
     draw_list = imgui.get_window_draw_list()
-    color = theme.ACCENT if chosen else theme.TEXT if hovered else theme.LINE
-    thick = 2.0 if chosen else 1.5 if hovered else 1.0
-    alpha = 1.0 if chosen else 0.75 if hovered else 1.0
-    draw_list.add_rect(corner, far, theme.packed(color, alpha), theme.ROUNDING, thick)
+    color, thick = (theme.packed(theme.TEXT, 0.75), 1.5) if hovered else (theme.packed(theme.LINE), 1.0)
+    if chosen:
+        color, thick = theme.packed(theme.ACCENT), 2.0
+    draw_list.add_rect(corner, far, color, theme.ROUNDING, thick)
     if not chosen:
         return
     mark = imgui.ImVec2(far.x - 14, corner.y + 14)

@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui_ctx
 
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.rectangle import Plane, scaled
+from clfractal.scene.rectangle import Axis, Plane, scaled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.schema.shape import Solid
 from clfractal.viewer import plane_moves
 from clfractal.viewer.panels import palette_editor, renderer, theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import area
-from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
-_OWN = (("normal", "Normal"), ("side", "Side"), ("up", "Up"))
-_SPACE = (("x", "x"), ("y", "y"), ("z", "z"))
+_OWN: tuple[Axis, ...] = ("normal", "side", "up")
+_SPACE: tuple[Axis, ...] = ("x", "y", "z")
 
 
 def summary(ui: Ui) -> str:
@@ -39,16 +37,12 @@ def draw(ui: Ui) -> None:
         _own_plane(ui)
         return
     planes = scene.cut_planes
-    chosen = min(int(ui.memory.get("cut_plane", 0)), max(len(planes) - 1, 0))
     if w.filtering(ui):
         for index in range(len(planes)):
             _cut_plane(ui, index)
         return
-    for index in range(len(planes)):
-        if _line(ui, index, index == chosen):
-            chosen = index
-    ui.memory["cut_plane"] = chosen
-    _buttons(ui, chosen)
+    chosen = w.listed(ui, "cut_plane", len(planes), lambda index, on: _line(ui, index, on))
+    _buttons(ui)
     w.problem(ui, "cut_planes")
     if chosen < len(ui.studio.scene.cut_planes):
         _cut_plane(ui, chosen)
@@ -58,39 +52,21 @@ def draw(ui: Ui) -> None:
 
 def _line(ui: Ui, index: int, chosen: bool) -> bool:
     """One plane of the list; whether it was clicked."""
-    plane = ui.studio.scene.cut_planes[index]
-    corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
-    wide = imgui.get_content_region_avail().x
-    clicked = area(f"##plane{index}", (wide, height))
-    draw = imgui.get_window_draw_list()
-    if chosen or imgui.is_item_hovered():
-        back = theme.ACCENT_FAINT if chosen else theme.FRAME
-        far = imgui.ImVec2(corner.x + wide, corner.y + height)
-        draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
-    y = corner.y + (height - imgui.get_font_size()) / 2
-    icon = theme.SCISSORS if plane.cut else theme.EYE
-    draw.add_text(imgui.ImVec2(corner.x + 10, y), theme.packed(theme.DIM), icon)
-    name = f"Plane {index + 1}" if plane.count == 1 else f"Planes {index + 1} (x{plane.count})"
-    draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), name)
-    x, y_, z = plane.plane.placed.normal
-    text = f"{x + 0.0:.2g}, {y_ + 0.0:.2g}, {z + 0.0:.2g}".replace("-", "\u2212")
-    place = imgui.ImVec2(corner.x + wide - imgui.calc_text_size(text).x - 8, y)
-    draw.add_text(place, theme.packed(theme.DIM), text)
-    return bool(clicked)
+    plane, line = ui.studio.scene.cut_planes[index], w.Line(f"plane{index}", chosen)
+    line.write(10, theme.SCISSORS if plane.cut else theme.EYE, theme.DIM)
+    line.write(31, f"Plane {index + 1}" if plane.count == 1 else f"Planes {index + 1} (x{plane.count})")
+    normal = ", ".join(f"{each + 0.0:.2g}" for each in plane.plane.placed.normal)
+    line.write(-8, normal.replace("-", "\u2212"), theme.DIM)
+    return line.clicked
 
 
-def _buttons(ui: Ui, chosen: int) -> None:
-    planes = [plain(plane) for plane in ui.studio.scene.cut_planes]
+def _buttons(ui: Ui) -> None:
+    planes = [w.plain(plane) for plane in ui.studio.scene.cut_planes]
     room = sum(plane["count"] for plane in planes) < MAX_PLANES
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     if w.button("Add a plane", icon=theme.PLUS, enabled=room):
-        _set(ui, [*planes, _first_plane(ui)], len(planes))
-    w.in_row(4)
-    if w.icon_button(theme.COPY, "Duplicate", enabled=bool(planes) and room):
-        _set(ui, [*planes, {**planes[chosen], "count": 1}], len(planes))
-    w.in_row(4)
-    if w.icon_button(theme.TRASH, "Remove", enabled=bool(planes)):
-        _set(ui, [*planes[:chosen], *planes[chosen + 1 :]], max(chosen - 1, 0))
+        w.set_entries(ui, "cut_planes", [*planes, _first_plane(ui)], "cut_plane", len(planes))
+    w.copy_and_remove(ui, "cut_planes", planes, "cut_plane", room, count=1)
 
 
 def _first_plane(ui: Ui) -> dict[str, Any]:
@@ -113,15 +89,10 @@ def _named(ui: Ui, path: str, chosen: tuple[str, ...]) -> None:
     for name, each in ui.studio.scene.objects.items():
         if not isinstance(each, Solid) or each.join != "union":
             continue
-        width = w.row(ui, name, tip="Whether the plane cuts this object, too", path=path)
-        if width is not None and w.toggle(f"{path} {name}", name in chosen):
+        about, on = "Whether the plane cuts this object, too", name in chosen
+        if w.switch(ui, name, on, path=path, name=f"{path} {name}", tip=about):
             others = [other for other in chosen if other != name]
-            ui.studio.edit({path: others if name in chosen else [*others, name]})
-
-
-def _set(ui: Ui, planes: list[Any], chosen: int) -> None:
-    if ui.studio.edit({"cut_planes": planes}):
-        ui.memory["cut_plane"] = chosen
+            w.put(ui, path, others if on else [*others, name])
 
 
 def _cut_plane(ui: Ui, index: int) -> None:
@@ -132,20 +103,19 @@ def _cut_plane(ui: Ui, index: int) -> None:
         if isinstance(ui.studio.scene.renderer, SurfaceRenderer):
             w.field(ui, f"{path}.set", "Cut the set")
         _named(ui, f"{path}.objects", plane.objects)
-    w.field(ui, f"{path}.opacity")
-    w.field(ui, f"{path}.inside_opacity", start=plane.opacity, auto="as opacity")
-    w.field(ui, f"{path}.count", "Parallel planes")
+    inside = {"start": plane.opacity, "auto": "as opacity"}
+    names, count = ("opacity", "inside_opacity", "count"), {"label": "Parallel planes"}
+    w.fields(ui, path, names, inside_opacity=inside, count=count)
     if plane.count > 1:
         w.field(ui, f"{path}.spacing", step=plane.plane.placed.height / 1000)
     _iterations(ui, path)
     if not w.filtering(ui):
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        w.in_labels()
         about = "The renderer shows this plane's cut alone; switch back under Renderer"
         if w.button("Show the cut alone", icon=theme.SCISSORS, width=-1, about=about):
-            sections = {"plane": plain(plane.plane), "colors": plain(plane.colors)}
-            more = {"iterations": plane.iterations} if plane.iterations is not None else {}
-            changes = {f"renderer.{name}": value for name, value in {**sections, **more}.items()}
-            renderer.switch(ui, "cut_plane", changes)
+            values = {name: w.plain(getattr(plane, name)) for name in ("plane", "colors", "iterations")}
+            given = {f"renderer.{name}": value for name, value in values.items() if value is not None}
+            renderer.switch(ui, "cut_plane", given)
             return
     place(ui, f"{path}.plane")
     _colors(ui, f"{path}.colors")
@@ -153,14 +123,11 @@ def _cut_plane(ui: Ui, index: int) -> None:
 
 def _own_plane(ui: Ui) -> None:
     if not w.filtering(ui):
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
-        if w.button(
-            "Show it in the object", icon=theme.CUBE, width=-1, about="The surface, cut open at this plane"
-        ):
-            shown = ui.studio.scene.renderer
-            assert isinstance(shown, CutPlaneRenderer)
-            plane = {"plane": plain(shown.plane), "colors": plain(shown.colors), "opacity": 1.0, "cut": True}
-            renderer.switch(ui, "surface", {"cut_planes": [plane]})
+        w.in_labels()
+        about = "The surface, cut open at this plane"
+        if w.button("Show it in the object", icon=theme.CUBE, width=-1, about=about):
+            shown = {name: w.plain(w.value(ui, f"renderer.{name}")) for name in ("plane", "colors")}
+            renderer.switch(ui, "surface", {"cut_planes": [{**shown, "opacity": 1.0, "cut": True}]})
             return
     _iterations(ui, "renderer")
     place(ui, "renderer.plane")
@@ -175,9 +142,8 @@ def _iterations(ui: Ui, path: str) -> None:
 def _colors(ui: Ui, path: str) -> None:
     w.group(ui, "Colours by escape counts")
     palette_editor.draw(ui, f"{path}.palette")
-    w.field(ui, f"{path}.mode", segmented=True)
-    w.field(ui, f"{path}.curve", segmented=True)
-    w.fields(ui, path, ("scale", "offset", "repeat", "inside"), inside={"label": "Inside"})
+    names, apart = ("mode", "curve", "scale", "offset", "repeat", "inside"), {"segmented": True}
+    w.fields(ui, path, names, mode=apart, curve=apart, inside={"label": "Inside"})
 
 
 def place(ui: Ui, path: str) -> None:
@@ -187,14 +153,8 @@ def place(ui: Ui, path: str) -> None:
     placed = plane.placed
     if plane.corners is None and not plane.transform:
         step = placed.height / 400
-        w.fields(
-            ui,
-            path,
-            ("center", "normal", "up", "width", "height"),
-            center={"step": step},
-            normal={"step": 0.01},
-            up={"step": 0.01, "start": placed.up},
-        )
+        names, up = ("center", "normal", "up", "width", "height"), {"step": 0.01, "start": placed.up}
+        w.fields(ui, path, names, center={"step": step}, normal={"step": 0.01}, up=up)
     else:
         _placed(ui, path, plane)
     if not w.filtering(ui):
@@ -215,9 +175,9 @@ def _placed(ui: Ui, path: str, plane: Plane) -> None:
     )
     if w.filtering(ui):
         return
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     if w.button("Write it by middle and normal", width=-1, about="The same plane, with fields for each"):
-        _move(ui, path, scaled(plane, 1.0))
+        w.put(ui, path, scaled(plane, 1.0))
 
 
 def _moves(ui: Ui, path: str, plane: Plane) -> None:
@@ -225,21 +185,21 @@ def _moves(ui: Ui, path: str, plane: Plane) -> None:
     w.group(ui, "Move")
     _amount(ui, sizes, "move", "Step", w.Scale(0, 10, (0.0005, 1), log=True, unit=" %", factor=100.0))
     distance = sizes["move"] * plane.placed.height
-    for axis, name in _OWN:
+    for axis in _OWN:
         _step(
             ui,
             path,
-            f"Along {name.lower()}",
+            f"Along {axis}",
             lambda sign, axis=axis: plane_moves.shift(plane, **{axis: sign * distance}),  # type: ignore[misc]
         )
     w.group(ui, "Rotate")
     _amount(ui, sizes, "turn", "Angle", w.Scale(0, 360, (0, 90), unit="°"))
-    for axis, name in (*_OWN, *_SPACE):
-        own = (axis, name) in _OWN
+    for axis in (*_OWN, *_SPACE):
+        own = axis in _OWN
         _step(
             ui,
             path,
-            f"Own {name.lower()}" if own else f"Axis {name}",
+            f"Own {axis}" if own else f"Axis {axis}",
             lambda sign, axis=axis: plane_moves.rotate(plane, axis, sign * sizes["turn"]),  # type: ignore[misc]
             about="about the plane's own axis" if own else "about the axis of space, through the origin",
         )
@@ -251,9 +211,7 @@ def _moves(ui: Ui, path: str, plane: Plane) -> None:
 def _amount(ui: Ui, sizes: dict[str, float], key: str, label: str, scale: w.Scale) -> None:
     about = "of the plane's height" if key == "move" else ""
     width = w.row(ui, label, tip=f"by how much one click moves it {about}".strip(), path=f"step.{key}")
-    if width is None:
-        return
-    change = w.number_box(w.boxes(ui), f"plane.{key}", sizes[key], width, scale)
+    change = w.number_box(w.boxes(ui), f"plane.{key}", sizes[key], width, scale) if width else w.Change()
     if change.value is not None:
         sizes[key] = change.value
 
@@ -266,12 +224,7 @@ def _step(ui: Ui, path: str, label: str, change: Callable[[float], Plane], about
     for sign, icon in ((-1.0, theme.MINUS), (1.0, theme.PLUS)):
         if sign > 0:
             w.in_row(4)
-        imgui.push_item_flag(imgui.ItemFlags_.button_repeat, True)
-        clicked = w.button(f"{icon}##{label}", width=(width - 4) / 2)
-        imgui.pop_item_flag()
+        with imgui_ctx.push_button_repeat():
+            clicked = w.button(f"{icon}##{label}", width=(width - 4) / 2)
         if clicked:
-            _move(ui, path, change(sign))
-
-
-def _move(ui: Ui, path: str, plane: Plane) -> None:
-    ui.studio.edit({path: plain(plane)})
+            w.put(ui, path, change(sign))

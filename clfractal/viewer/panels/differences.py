@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 from imgui_bundle import imgui
 
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
+from clfractal.viewer.editing import plain
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.metadata import metas, plain
+from clfractal.viewer.panels.metadata import metas
 from clfractal.viewer.panels.ui import Ui
 
 # What a scene is about rather than how it is set.
@@ -85,25 +87,16 @@ def draw(ui: Ui) -> None:
 
 
 def _cached(ui: Ui) -> list[Difference]:
-    known = ui.memory.get("differences")
-    if known is None or known[0] is not ui.studio.scene:
-        known = ui.memory["differences"] = (ui.studio.scene, differences(ui.studio.scene))
-    found: list[Difference] = known[1]
-    return found
+    scene = ui.studio.scene
+    return ui.kept_for("differences", scene, lambda: differences(scene))
 
 
 def _line(ui: Ui, each: Difference, name: str) -> None:
     *before, last = name.split(".")
     label = " · ".join([*(each.replace("_", " ") for each in before), w.label_of(last)])
-    about = f"{words(each.value, 200)}\ndefault: {words(each.default, 200)}"
-    width = w.row(
-        ui,
-        label[:1].upper() + label[1:],
-        path=each.path,
-        tip=about,
-        differs=True,
-        reset=lambda: _reset(ui, each),
-    )
+    about, reset = f"{words(each.value, 200)}\ndefault: {words(each.default, 200)}", partial(_reset, ui, each)
+    label = label[:1].upper() + label[1:]
+    width = w.row(ui, label, path=each.path, tip=about, differs=True, reset=reset)
     if width is None:
         return
     height = imgui.get_frame_height()
@@ -118,7 +111,7 @@ def _line(ui: Ui, each: Difference, name: str) -> None:
     draw.pop_clip_rect()
     w.in_row(4)
     if w.icon_button(theme.RESET, f"Back to {words(each.default, 60)}", name=f"reset.{each.path}"):
-        _reset(ui, each)
+        reset()
 
 
 def _reset(ui: Ui, each: Difference) -> None:
@@ -128,10 +121,8 @@ def _reset(ui: Ui, each: Difference) -> None:
 
 def words(value: Any, most: int) -> str:
     """A plain value in few words."""
-    if value is None:
-        text = "none"
-    elif isinstance(value, bool):
-        text = "yes" if value else "no"
+    if value is None or isinstance(value, bool):
+        text = {None: "none", True: "yes", False: "no"}[value]
     elif isinstance(value, (int, float)):
         text = (f"{value:.5g}" if isinstance(value, float) else str(value)).replace("-", "\u2212")
     elif isinstance(value, str):

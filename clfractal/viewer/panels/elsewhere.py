@@ -13,6 +13,7 @@ from imgui_bundle import imgui
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 from clfractal.viewer.panels import layout, theme
+from clfractal.viewer.panels.buttons import wrapped
 from clfractal.viewer.panels.metadata import metas, sections_of
 from clfractal.viewer.panels.ui import Ui
 
@@ -80,15 +81,13 @@ def _levels(section: type[Section], name: str) -> int:
 
 def _kind_of(section: type[Section]) -> str:
     """What tells one kind of section from others: `type: volume`."""
-    for name in _KINDS:
-        field = section.model_fields.get(name)
-        if (
-            field is not None
-            and get_origin(field.annotation) is Literal
-            and len(get_args(field.annotation)) == 1
-        ):
-            return f"{name}: {get_args(field.annotation)[0]}"
-    return ""
+    words = {name: section.model_fields[name].annotation for name in _KINDS if name in section.model_fields}
+    kinds = (
+        f"{name}: {get_args(word)[0]}"
+        for name, word in words.items()
+        if get_origin(word) is Literal and len(get_args(word)) == 1
+    )
+    return next(kinds, "")
 
 
 def found(wanted: str, drawn: set[str]) -> list[Setting]:
@@ -132,13 +131,11 @@ def draw(ui: Ui) -> None:
     layout.title("Not in use at the moment")
     for each in hits[:_MOST]:
         layout.in_labels()
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_unformatted(each.path)
+        wrapped(each.path)
         told = "; ".join(filter(None, [each.told.split(";")[0], ", ".join(_missing(ui, each))]))
         if told:
             layout.in_labels()
-            imgui.text_colored(theme.vec(theme.DIM), told)
-        imgui.pop_text_wrap_pos()
+            wrapped(told, color=theme.DIM)
     if len(hits) > _MOST:
         layout.in_labels()
         imgui.text_colored(theme.vec(theme.FAINT), f"and {len(hits) - _MOST} more")
@@ -146,9 +143,6 @@ def draw(ui: Ui) -> None:
 
 def _missing(ui: Ui, setting: Setting) -> list[str]:
     """What the scene lacks for a setting, as lines of its file."""
-    found = []
-    for need in setting.needed:
-        path, _, value = need.partition(": ")
-        if "*" in path or str(ui.studio.value(path)) != value:
-            found.append(f"needs {need}")
-    return found
+    pairs = [need.split(": ", 1) for need in setting.needed]
+    lacks = [pair for pair in pairs if "*" in pair[0] or str(ui.studio.value(pair[0])) != pair[1]]
+    return [f"needs {': '.join(pair)}" for pair in lacks]

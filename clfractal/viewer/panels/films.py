@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.film_kinds import CONTAINERS
@@ -16,7 +15,6 @@ from clfractal.viewer.number_words import counted
 from clfractal.viewer.panels import layout, right_dock, theme
 from clfractal.viewer.panels import order_form as form
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.ui import Ui
 
 PRESETS: dict[str, form.Size | None] = {
@@ -35,28 +33,19 @@ KINDS: dict[str, tuple[str, tuple[str, ...]]] = {
     "EXR pictures": ("_####.exr", ()),
 }
 """Kinds of films: how their names end, and what `clfractal animate` is told more."""
-_MOST_SAMPLES = 65_536
 
 
 @dataclass(slots=True)
-class Wanted:
-    """What the panel remembers.
+class Wanted(form.Wanted):
+    """What the panel remembers; without a size it is the scene's.
 
     Attributes:
-        size: pixels; None: the scene's.
-        samples: for a pixel; None: as many as the scene says.
-        part: the first and the last frame; None: all.
         kind: the one of `KINDS`.
-        name: of the file, without ending, relative to the current folder; empty: a usual one.
-        problem: why the last one could not begin, or empty.
+        part: the first and the last frame; None: all.
     """
 
-    size: form.Size | None = None
-    samples: int | None = None
-    part: tuple[int, int] | None = None
     kind: str = "MP4, H.264"
-    name: str = ""
-    problem: str = ""
+    part: tuple[int, int] | None = None
 
 
 def draw(ui: Ui) -> None:
@@ -65,24 +54,22 @@ def draw(ui: Ui) -> None:
         return
     state: Wanted = ui.memory.setdefault("films", Wanted())
     animation = ui.studio.scene.animation
-    with right_dock.window(ui, "films", "Render the film", theme.FILM):
-        imgui.begin_child("##films", imgui.ImVec2(0, 0))
+    with (
+        right_dock.window(ui, "films", "Render the film", theme.FILM),
+        imgui_ctx.begin_child("##films", imgui.ImVec2(0, 0)),
+    ):
         if animation is None:
             w.hint(ui, f"The scene has no film yet. {ui.keys.hint('timeline') or 'The timeline'} begins one.")
         else:
             _settings(ui, state, animation)
             _start(ui, state, animation)
         _list(ui)
-        imgui.end_child()
 
 
 def output_of(ui: Ui, state: Wanted) -> Path:
     """The file of a film as the panel is set."""
-    files: Any = ui.memory.get("files")
-    path = files.source.path if files is not None else None
-    text = state.name.strip() or (path.stem if path is not None else "film")
     ending = KINDS[state.kind][0]
-    place = Path(text).expanduser()
+    place = Path(state.name.strip() or form.scene_name(ui, "film")).expanduser()
     if place.suffix.lower() in (*CONTAINERS, ".png", ".exr"):
         place = place.with_suffix("")
     return Path.cwd() / place.with_name(f"{place.name}{ending}") if place.name else Path.cwd() / ending
@@ -101,10 +88,9 @@ def order_of(ui: Ui, state: Wanted, animation: Animation) -> FilmOrder:
         raise FileError("is there already; choose another name", Where(output.name))
     if ui.studio.films.under_way(output):
         raise FileError("is under way already", Where(output.name))
-    files: Any = ui.memory["files"]
     first, last = _part(state, animation)
     return FilmOrder(
-        files.text(),
+        ui.memory["files"].text(),
         ui.studio.document.folder.absolute(),
         output,
         first,
@@ -126,15 +112,13 @@ def _part(state: Wanted, animation: Animation) -> tuple[int, int]:
 def _settings(ui: Ui, state: Wanted, animation: Animation) -> None:
     image = ui.studio.scene.image
     state.size = form.size(ui, "films", PRESETS, state.size, (image.width, image.height))
-    usual = ui.studio.scene.renderer.samples
-    state.samples = form.samples(ui, "films", state.samples, usual, _MOST_SAMPLES)
+    state.samples = form.samples(ui, "films", state.samples)
     width = form.label("Frames")
     first, last = _part(state, animation)
     each = (width - 50) / 2
     begin = form.number(ui, "films.first", first, each, animation.count - 1, 0)
     w.in_row(5)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.FAINT), "to")
+    w.beside("to", theme.FAINT)
     w.in_row(5)
     end = form.number(ui, "films.last", last, each, animation.count - 1, 0)
     if begin is not None or end is not None:
@@ -142,18 +126,8 @@ def _settings(ui: Ui, state: Wanted, animation: Animation) -> None:
     w.in_row(4)
     if w.icon_button(theme.RESET, "All frames", name="films.all", enabled=state.part is not None):
         state.part = None
-    width = form.label("Format")
-    chosen = w.choose("films.kind", {kind: kind for kind in KINDS}, state.kind, width)
-    if chosen is not None:
-        state.kind, state.problem = chosen, ""
-    width = form.label("Name")
-    imgui.set_next_item_width(width)
-    _, text = imgui.input_text_with_hint(
-        "##films.name", output_of(ui, Wanted(kind=state.kind)).stem, state.name
-    )
-    if text != state.name:
-        state.name, state.problem = text, ""
-    w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
+    kinds = {kind: kind for kind in KINDS}
+    form.files(state, "films", kinds, lambda: output_of(ui, Wanted(kind=state.kind)).stem)
 
 
 def _start(ui: Ui, state: Wanted, animation: Animation) -> None:
@@ -204,47 +178,20 @@ def start(ui: Ui, state: Wanted, animation: Animation, *, resume: bool = False) 
 
 def _list(ui: Ui) -> None:
     films = list(ui.studio.films.films)
-    imgui.dummy(imgui.ImVec2(0, 2))
-    for film in reversed(films):
-        imgui.push_id(str(id(film)))
-        _film(ui, film)
-        imgui.pop_id()
     ended = not all(film.under_way for film in films)
-    if ended and w.button("Clear the list", about="Forgets what has ended; the files stay"):
+    if form.listed(films, lambda film: _film(ui, film), ended=ended):
         ui.studio.films.clear()
 
 
 def _film(ui: Ui, film: RenderedFilm) -> None:
-    wide, side = imgui.get_content_region_avail().x, imgui.get_frame_height()
-    icon, color = _sign(film)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(color), icon)
-    w.in_row(7)
-    imgui.align_text_to_frame_padding()
-    imgui.text(clipped(film.order.output.name, imgui.get_content_region_avail().x - side - 6))
-    w.tip(str(film.order.output))
-    if not film.written:
-        imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
-        if film.under_way:
-            if w.icon_button(theme.CROSS, "Cancel it: what is done is kept", name="cancel"):
-                film.cancel()
-        elif w.icon_button(theme.REFRESH, "Continue it", name="continue"):
-            ui.studio.films.order(film.order, resume=True)
+    output = film.order.output
+    form.head(film, theme.FILM, output.name, str(output), button=not film.written)
     if film.under_way:
-        form.bar(film.done / film.order.count, wide)
-    with theme.font(size=12.5), theme.colors(text=theme.WARNING if film.problem else theme.FAINT):
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_unformatted(state_text(film))
-        imgui.pop_text_wrap_pos()
-    imgui.dummy(imgui.ImVec2(0, 2))
-
-
-def _sign(film: RenderedFilm) -> tuple[str, theme.Rgba]:
-    if film.problem:
-        return theme.WARN, theme.WARNING
-    if film.written:
-        return theme.CHECK, theme.GOOD
-    return (theme.CROSS, theme.FAINT) if film.cancelled else (theme.FILM, theme.ACCENT)
+        if w.icon_button(theme.CROSS, "Cancel it: what is done is kept", name="cancel"):
+            film.cancel()
+    elif not film.written and w.icon_button(theme.REFRESH, "Continue it", name="continue"):
+        ui.studio.films.order(film.order, resume=True)
+    form.foot(film, state_text(film), film.done / film.order.count if film.under_way else None)
 
 
 def state_text(film: RenderedFilm) -> str:

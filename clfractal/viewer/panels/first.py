@@ -13,8 +13,8 @@ from clfractal.scene.places import usual_threshold
 from clfractal.schema.kinds import members
 from clfractal.schema.light import LightBase
 from clfractal.schema.shape import solids
+from clfractal.viewer.editing import plain
 from clfractal.viewer.panels import menu, right_dock, theme
-from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.timeline_area import left_of, room_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.pointer import Floats

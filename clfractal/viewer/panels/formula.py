@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Link
@@ -37,16 +37,15 @@ def draw(ui: Ui) -> None:
         _julia(ui, "formula", chain.first)
     elif not w.filtering(ui):
         w.hint(ui, "A chain of the library. Edit a copy to change its members.")
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        w.in_labels()
         if w.button("Edit a copy", icon=theme.PENCIL, width=-1):
             _open_chain(ui)
             return
     w.group(ui, "Iteration")
     w.field(ui, "formula.iterations")
-    radius = ui.studio.scene.chain.bailout
-    w.field(ui, "formula.bailout", start=radius, auto=f"{radius:.4g}, its own")
-    far = ui.studio.scene.chain.distance_bailout
-    w.field(ui, "formula.distance_bailout", start=far, auto=f"{far:.4g}, its own")
+    for name in ("bailout", "distance_bailout"):
+        radius = getattr(ui.studio.scene.chain, name)
+        w.field(ui, f"formula.{name}", start=radius, auto=f"{radius:.4g}, its own")
 
 
 def chain_path(ui: Ui) -> str | None:
@@ -62,7 +61,7 @@ def chain_path(ui: Ui) -> str | None:
 def _choice(ui: Ui) -> None:
     """The button with the formula's title that opens the library, and the editor's."""
     formula = ui.studio.scene.formula
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     wide, height = imgui.get_content_region_avail().x, imgui.get_frame_height()
     text = formula_library.titles().get(formula.name or "", ui.studio.scene.chain.title or "Own formula")
     about = ui.studio.scene.chain.first.formula.description if len(ui.studio.scene.chain.links) == 1 else ""
@@ -72,10 +71,7 @@ def _choice(ui: Ui) -> None:
         ):
             imgui.open_popup("##library")
     w.in_row(4)
-    on = "formula_editor" in ui.show
-    hint = ui.keys.hint("formula")
-    if w.icon_button(theme.CODE, f"Edit it as text ({hint})", on=on):
-        ui.act("formula")
+    w.act(ui, "formula", theme.CODE, "Edit it as text", on="formula_editor" in ui.show)
     w.in_row(4)
     if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=chain_path(ui) is None):
         _open_chain(ui)
@@ -103,56 +99,52 @@ def parameters(ui: Ui, path: str, bound: BoundFormula) -> None:
 def scale_of(parameter: Parameter) -> w.Scale:
     """How a parameter is dragged and shown."""
     low, high = parameter.minimum, parameter.maximum
-    usual = None
-    if low is not None and high is not None and high - low <= _FAR:
-        usual = (low, high)
+    usual = (low, high) if low is not None and high is not None and high - low <= _FAR else None
     log = usual is not None and usual[0] > 0 and usual[1] / usual[0] > 2000
     return w.Scale(low, high, usual, log, parameter.type == "int")
 
 
 def _choices(ui: Ui, path: str, parameter: Parameter, current: float) -> None:
     assert parameter.choices is not None
-    width = w.row(
+    words = {each: f"{each:g}" for each in parameter.choices}
+    found = w.pick(
         ui,
         w.label_of(parameter.name),
+        words,
+        current,
         path=path,
+        listed=len(words) > 5,
         tip=parameter.description,
         differs=current != parameter.default,
-        reset=lambda: _put(ui, path, parameter.default),
+        reset=lambda: w.put(ui, path, parameter.default),
     )
-    if width is None:
-        return
-    words = {each: f"{each:g}" for each in parameter.choices}
-    show = w.segments if len(words) <= 5 else w.choose
-    found = show(path, words, current, width)
     if found is not None:
-        _put(ui, path, int(found) if parameter.type == "int" else found)
-    w.problem(ui, path)
+        w.put(ui, path, int(found) if parameter.type == "int" else found)
 
 
 def _julia(ui: Ui, path: str, bound: BoundFormula) -> None:
     """The constant that is added instead of the point, with a slider for each variable."""
     if bound.formula.add == "none":
         return
-    given = w.value(ui, f"{path}.julia")
     place = f"{path}.julia"
+    given = w.value(ui, place)
     first = [0.0] * len(bound.formula.variables)
-    own = bound.formula.julia
+    own, on = bound.formula.julia, given is not None
     width = w.row(
         ui,
         "Julia set",
         path=place,
         tip="a constant is added instead of the point",
-        differs=given is not None,
-        reset=lambda: _put(ui, place, None),
+        differs=on,
+        reset=lambda: w.put(ui, place, None),
     )
-    if width is not None:
+    about = "" if own is None else "Instead of the formula's own constant"
+    if width is not None and w.toggle(place, on, about):
         kept = ui.memory.setdefault("julia.kept", {})
-        if w.toggle(place, given is not None, "" if own is None else "Instead of the formula's own constant"):
-            if given is not None:
-                kept[path] = list(given)
-            start = kept.get(path, list(own or first))
-            _put(ui, place, None if given is not None else start if len(start) == len(first) else first)
+        if on:
+            kept[path] = list(given)
+        start = kept.get(path, list(own or first))
+        w.put(ui, place, None if on else start if len(start) == len(first) else first)
     given = w.value(ui, place)
     before = list(given or ())
     for index, number in enumerate(before):
@@ -197,14 +189,13 @@ def _members(ui: Ui, root: str) -> None:
         about = "number of applications before the next formula's turn"
         w.number(ui, f"{path}.count", "Times", float(link.count), scale, default=1.0, tip=about)
         _range(ui, path, link)
-        imgui.push_id(index)
-        parameters(ui, path, link.bound)
-        _julia(ui, path, link.bound)
-        imgui.pop_id()
+        with imgui_ctx.push_id(f"{index}"):
+            parameters(ui, path, link.bound)
+            _julia(ui, path, link.bound)
     w.problem(ui, root)
     if w.filtering(ui):
         return
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     if w.button("Add a formula", icon=theme.PLUS, width=-1, enabled=len(members) < MAX_LINKS):
         imgui.open_popup("##member")
     name = formula_library.chosen(ui, "##member", "", single=True)
@@ -225,7 +216,6 @@ def _range(ui: Ui, path: str, link: Link) -> None:
 
 def _member_line(ui: Ui, root: str, members: list[Any], index: int, title: str) -> list[Any] | None:
     """The heading of a member, with buttons to move and remove it; the new list, if one was clicked."""
-    imgui.push_id(f"{root}.{index}")
     imgui.dummy(imgui.ImVec2(0, 1))
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     wide = imgui.get_content_region_avail().x
@@ -236,24 +226,13 @@ def _member_line(ui: Ui, root: str, members: list[Any], index: int, title: str) 
     with theme.font("bold"):
         draw.add_text(imgui.ImVec2(corner.x + 11, y), theme.packed(theme.TEXT), f"{index + 1}  {title}")
     imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + wide - 3 * height - 6)
+    left = [*members[:index], *members[index + 1 :]]
     found = None
-    if w.icon_button(theme.UP, "Earlier", enabled=index > 0):
-        found = _exchanged(members, index, index - 1)
-    w.in_row(3)
-    if w.icon_button(theme.DOWN, "Later", enabled=index + 1 < len(members)):
-        found = _exchanged(members, index, index + 1)
-    w.in_row(3)
-    if w.icon_button(theme.TRASH, "Remove", enabled=len(members) > 1):
-        found = [*members[:index], *members[index + 1 :]]
-    imgui.pop_id()
+    with imgui_ctx.push_id(f"{root}.{index}"):
+        for icon, about, way in ((theme.UP, "Earlier", -1), (theme.DOWN, "Later", 1)):
+            if w.icon_button(icon, about, enabled=0 <= index + way < len(members)):
+                found = [*left[: index + way], members[index], *left[index + way :]]
+            w.in_row(3)
+        if w.icon_button(theme.TRASH, "Remove", enabled=len(members) > 1):
+            found = left
     return found
-
-
-def _exchanged(members: list[Any], one: int, other: int) -> list[Any]:
-    found = list(members)
-    found[one], found[other] = found[other], found[one]
-    return found
-
-
-def _put(ui: Ui, path: str, value: Any) -> None:
-    ui.studio.edit({path: value})

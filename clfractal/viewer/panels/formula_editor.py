@@ -6,6 +6,7 @@ keeps its last good formula and picture.
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -127,18 +128,12 @@ def _follow(ui: Ui, state: Editing) -> None:
     if source == state.source:
         return
     state.source = source
-    if spec.inline is not None and state.text:
-        try:
-            if read_formula(state.text) == spec.inline:
-                return  # it is what was typed here: comments and cursor stay
-        except ClfractalError:
-            pass
-    try:
+    with suppress(ClfractalError):
+        if spec.inline is not None and state.text and read_formula(state.text) == spec.inline:
+            return  # it is what was typed here: comments and cursor stay
+    with ui.studio.telling():
         state.text = _typed(ui, spec) or text_of(spec)
-    except ClfractalError as error:
-        ui.studio.tell(str(error), wrong=True)
-        return
-    _fill(state)
+        _fill(state)
 
 
 def _typed(ui: Ui, spec: FormulaSpec) -> str | None:
@@ -188,10 +183,9 @@ def _edit(ui: Ui, state: Editing) -> None:
 
 def check(ui: Ui, state: Editing) -> None:
     """Checks the text, marks what is wrong, and takes over what is right as a step of undo."""
-    state.changed, state.text = None, state.seen
+    state.changed, state.text, state.error = None, state.seen, None
     try:
         inline = read_formula(state.text)
-        state.error = None
     except ClfractalError as error:
         state.error = error
     _mark(state)
@@ -199,16 +193,12 @@ def check(ui: Ui, state: Editing) -> None:
         return
     ui.studio.formula_texts.remember(inline, state.text)
     spec = ui.studio.scene.formula
-    if spec.inline == inline or _is_library(spec, inline):
+    if inline == (catalog.description(spec.name) if spec.name is not None else spec.inline):
         return
     if not ui.studio.edit({"formula": applied(spec, inline)}):
         # The text is a formula, but not for this scene (a zoom beyond its bounds, for example).
         state.error = FormulaError(ui.studio.problems.pop("formula", "does not fit this scene"))
     state.source = _source(ui.studio.scene.formula)
-
-
-def _is_library(spec: FormulaSpec, inline: dict[str, Any]) -> bool:
-    return spec.name is not None and catalog.description(spec.name) == inline
 
 
 def _to_file(ui: Ui, state: Editing) -> None:
@@ -231,10 +221,7 @@ def _to_file(ui: Ui, state: Editing) -> None:
         if not ask["problem"]:
             imgui.close_current_popup()
     if ask["problem"]:
-        with theme.colors(text=theme.WARNING):
-            imgui.push_text_wrap_pos(360.0)
-            imgui.text_unformatted(ask["problem"])
-            imgui.pop_text_wrap_pos()
+        w.wrapped(ask["problem"], 360.0, theme.WARNING)
     imgui.end_popup()
 
 
@@ -289,16 +276,13 @@ def _footer(state: Editing) -> None:
         w.in_row()
         imgui.text_colored(theme.vec(theme.DIM), "Right: the picture shows it.")
     else:
-        place = f"Line {error.where.line}" if error.where.line is not None else "Here"
-        if error.where.line is not None and error.where.column is not None:
-            place = f"{place}, column {error.where.column}"
-        path = f" ({error.where.path})" if error.where.path else ""
-        with theme.colors(text=theme.WARNING):
-            imgui.push_text_wrap_pos(0.0)
-            imgui.text_unformatted(f"{theme.WARN}  {place}{path}: {error.message}")
-            imgui.pop_text_wrap_pos()
-        if imgui.is_item_clicked() and error.where.line is not None:
-            state.editor.set_cursor(TextEditor.DocPos(error.where.line - 1, (error.where.column or 1) - 1))
-            state.editor.scroll_to_line(error.where.line - 1, TextEditor.Scroll.align_middle)
+        where = error.where
+        place = f"Line {where.line}" if where.line is not None else "Here"
+        column = f", column {where.column}" if where.line is not None and where.column is not None else ""
+        path = f" ({where.path})" if where.path else ""
+        w.wrapped(f"{theme.WARN}  {place}{column}{path}: {error.message}", color=theme.WARNING)
+        if imgui.is_item_clicked() and where.line is not None:
+            state.editor.set_cursor(TextEditor.DocPos(where.line - 1, (where.column or 1) - 1))
+            state.editor.scroll_to_line(where.line - 1, TextEditor.Scroll.align_middle)
             state.editor.set_focus()
         w.tip("Click to go there")

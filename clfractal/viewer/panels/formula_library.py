@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.errors import ClfractalError
 from clfractal.formulas import catalog
@@ -77,13 +77,8 @@ def chosen(ui: Ui, popup: str, current: str, *, single: bool) -> str | None:
 
 def _stepped(ui: Ui, count: int) -> bool:
     """Moves to another row of the library by keys; whether one was pressed."""
-    page = 10
-    steps = {
-        imgui.Key.down_arrow: 1,
-        imgui.Key.up_arrow: -1,
-        imgui.Key.page_down: page,
-        imgui.Key.page_up: -page,
-    }
+    key = imgui.Key
+    steps = {key.down_arrow: 1, key.up_arrow: -1, key.page_down: 10, key.page_up: -10}
     step = sum(by for key, by in steps.items() if imgui.is_key_pressed(key))
     ui.memory["formula.row"] = min(max(ui.memory.get("formula.row", 0) + step, 0), max(count - 1, 0))
     return step != 0
@@ -92,29 +87,24 @@ def _stepped(ui: Ui, count: int) -> bool:
 def _listed(ui: Ui, names: Sequence[str], current: str, moved: bool) -> str | None:
     """Rows of the library, of which one is that of the keys; the name that was chosen."""
     found = None
-    imgui.begin_child("##formulas", imgui.ImVec2(0, 0))
-    for number, name in enumerate(names):
-        at = number == ui.memory["formula.row"]
-        corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
-        if imgui.selectable(f"{titles()[name]}##{name}", name == current)[0]:
-            found = name
-        w.tip(str(catalog.description(name).get("description", "")).strip())
-        if at:
-            far = imgui.ImVec2(corner.x + wide, imgui.get_item_rect_max().y)
-            imgui.get_window_draw_list().add_rect(
-                imgui.ImVec2(corner.x, imgui.get_item_rect_min().y), far, theme.packed(theme.ACCENT), 3.0
-            )
-            if moved:
-                imgui.set_scroll_here_y()
-    if not names:
-        imgui.text_colored(theme.vec(theme.FAINT), "No formula has this name")
-    imgui.end_child()
+    with imgui_ctx.begin_child("##formulas", imgui.ImVec2(0, 0)):
+        for number, name in enumerate(names):
+            corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+            if imgui.selectable(f"{titles()[name]}##{name}", name == current)[0]:
+                found = name
+            w.tip(str(catalog.description(name).get("description", "")).strip())
+            if number == ui.memory["formula.row"]:
+                low = imgui.ImVec2(corner.x, imgui.get_item_rect_min().y)
+                far = imgui.ImVec2(corner.x + wide, imgui.get_item_rect_max().y)
+                imgui.get_window_draw_list().add_rect(low, far, theme.packed(theme.ACCENT), 3.0)
+                if moved:
+                    imgui.set_scroll_here_y()
+        if not names:
+            imgui.text_colored(theme.vec(theme.FAINT), "No formula has this name")
     enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
     return names[ui.memory["formula.row"]] if enter and names else found
 
 
 def _fits(ui: Ui, name: str) -> bool:
     """Whether a formula of the library can be a member of the scene's chain."""
-    if catalog.is_chain(name):
-        return False
-    return len(catalog.load(name).variables) == ui.studio.scene.chain.size
+    return not catalog.is_chain(name) and len(catalog.load(name).variables) == ui.studio.scene.chain.size

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -55,19 +57,18 @@ def draw(ui: Ui) -> None:
         state = ui.memory["gallery"] = Gallery(Shelf(scene_files(), device, ui.studio.woken))
     if _is_asked(ui):
         return
-    _dim(ui)
-    width, height = _size(ui)
-    imgui.set_cursor_pos(imgui.ImVec2((ui.size[0] - width) / 2, (ui.size[1] - height) / 2))
-    padding, back = theme.measures(window_padding=(18.0, 14.0), child_rounding=10.0), theme.PANEL_SOLID
-    with padding, theme.colors(child_bg=back):
-        flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.always_use_window_padding
-        imgui.begin_child("##gallery", imgui.ImVec2(width, height), flags)
-    _top(ui, state)
-    _cards(ui, state)
-    if state.sure is not None:
-        _ask(ui, state, state.sure)
-    imgui.end_child()
-    imgui.end()
+    (width, height), (wide, high) = _size(ui), ui.size
+    with _dim(ui):
+        imgui.set_cursor_pos(imgui.ImVec2((wide - width) / 2, (high - height) / 2))
+        padding, back = theme.measures(window_padding=(18.0, 14.0), child_rounding=10.0), theme.PANEL_SOLID
+        with padding, theme.colors(child_bg=back):
+            flags = imgui.ChildFlags_.borders | imgui.ChildFlags_.always_use_window_padding
+            imgui.begin_child("##gallery", imgui.ImVec2(width, height), flags)
+        _top(ui, state)
+        _cards(ui, state)
+        if state.sure is not None:
+            _ask(ui, state, state.sure)
+        imgui.end_child()
 
 
 def scene_files() -> list[Path]:
@@ -95,22 +96,19 @@ def _size(ui: Ui) -> tuple[float, float]:
     )
 
 
-def _dim(ui: Ui) -> None:
-    """Begins a window over everything, which keeps the pointer from what is below; a click on it closes the gallery."""
-    imgui.set_next_window_pos(imgui.ImVec2(0, 0))
-    imgui.set_next_window_size(imgui.ImVec2(*ui.size))
-    flags = (
-        imgui.WindowFlags_.no_decoration
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_saved_settings
-        | imgui.WindowFlags_.no_scroll_with_mouse
-        | imgui.WindowFlags_.no_nav
-    )
-    bare = theme.measures(window_padding=(0.0, 0.0), window_border_size=0.0, window_rounding=0.0)
-    with bare, theme.colors(window_bg=(0.02, 0.022, 0.028, 0.72)):
-        imgui.begin("##gallery.dim", None, flags)
-    if imgui.is_window_hovered() and imgui.is_mouse_clicked(0) and not imgui.is_window_appearing():
-        ui.show.discard("gallery")
+@contextmanager
+def _dim(ui: Ui) -> Iterator[None]:
+    """A window over everything, which keeps the pointer from what is below; a click on it closes the gallery."""
+    kinds = imgui.WindowFlags_
+    flags = kinds.no_scrollbar | kinds.no_scroll_with_mouse | kinds.no_nav
+    bare = {"window_padding": (0.0, 0.0), "window_border_size": 0.0, "window_rounding": 0.0}
+    with (
+        theme.colors(window_bg=(0.02, 0.022, 0.028, 0.72)),
+        theme.window("gallery.dim", (0.0, 0.0), ui.size, flags=flags, **bare),
+    ):
+        if imgui.is_window_hovered() and imgui.is_mouse_clicked(0) and not imgui.is_window_appearing():
+            ui.show.discard("gallery")
+        yield
 
 
 def _top(ui: Ui, state: Gallery) -> None:
@@ -119,23 +117,16 @@ def _top(ui: Ui, state: Gallery) -> None:
     imgui.align_text_to_frame_padding()
     with theme.font("bold", 18.0):
         imgui.text("Gallery")
-    imgui.same_line(0, 10)
-    count = sum(1 for entry in state.shelf.entries if matches(entry, state.kind, _text(ui)))
-    words = counted(count, "scene")
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.FAINT), words)
+    w.in_row(10)
+    w.beside(counted(len(_shown(ui, state)), "scene"), theme.FAINT)
     close = imgui.get_frame_height()
     narrow = wide < _NARROW
     find = wide if narrow else min(220.0, 0.24 * wide)
     chips = wide if narrow else min(430.0, wide - 190.0 - find - close - 18)
+    imgui.same_line(start + wide - close - (0 if narrow else chips + find + 18))
     if narrow:
-        imgui.same_line(start + wide - close)
         _close(ui)
-    else:
-        imgui.same_line(start + wide - chips - find - close - 18)
-    found = w.segments("gallery.kind", KINDS, state.kind, chips)
-    if found is not None:
-        state.kind = found
+    state.kind = w.segments("gallery.kind", KINDS, state.kind, chips) or state.kind
     if not narrow:
         w.in_row(8)
     w.search(ui, "gallery.filter", "Find a scene", find)
@@ -150,8 +141,9 @@ def _close(ui: Ui) -> None:
         ui.show.discard("gallery")
 
 
-def _text(ui: Ui) -> str:
-    return str(ui.memory.get("gallery.filter", ""))
+def _shown(ui: Ui, state: Gallery) -> list[Entry]:
+    text = str(ui.memory.get("gallery.filter", ""))
+    return [entry for entry in state.shelf.entries if matches(entry, state.kind, text)]
 
 
 def _cards(ui: Ui, state: Gallery) -> None:
@@ -162,7 +154,7 @@ def _cards(ui: Ui, state: Gallery) -> None:
     inner = imgui.get_content_region_avail().x - 6
     columns, width = cards.grid(inner, max(_LEAST, inner / _COLUMNS), 14.0)
     left, top = imgui.get_cursor_pos_x(), imgui.get_cursor_pos_y() + 2
-    shown = [entry for entry in state.shelf.entries if matches(entry, state.kind, _text(ui))]
+    shown = _shown(ui, state)
     high = cards.height(width, cards.Card("", None, title="-", line="-")) + 12
     here = _here(ui)
     visible: set[Entry] = set()
@@ -213,10 +205,8 @@ def _line(entry: Entry) -> str:
 
 
 def _about(entry: Entry) -> str:
-    if entry.problem:
-        return entry.problem
-    text = entry.about
-    return text if len(text) <= _ABOUT else f"{text[:_ABOUT].rsplit(' ', 1)[0]}\u2026"
+    text = entry.problem or entry.about
+    return text if entry.problem or len(text) <= _ABOUT else f"{text[:_ABOUT].rsplit(' ', 1)[0]}\u2026"
 
 
 def _picture(ui: Ui, state: Gallery, entry: Entry) -> None:
@@ -252,8 +242,7 @@ def _key(entry: Entry) -> tuple[str, str]:
 def _here(ui: Ui) -> Path | None:
     """The file of the present scene."""
     files: Any = ui.memory.get("files")
-    path = files.source.path if files is not None else None
-    return Path(path).resolve() if path is not None else None
+    return files.source.path.resolve() if files is not None and files.source.path is not None else None
 
 
 def _is_asked(ui: Ui) -> bool:
@@ -287,21 +276,18 @@ def _open(ui: Ui, entry: Entry) -> None:
 
 def _ask(ui: Ui, state: Gallery, entry: Entry) -> None:
     imgui.dummy(imgui.ImVec2(0, 2))
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.WARNING), theme.WARN)
+    w.beside(theme.WARN, theme.WARNING)
     w.in_row(8)
-    imgui.align_text_to_frame_padding()
-    imgui.text("The present scene has unsaved changes.")
+    w.beside("The present scene has unsaved changes.")
     w.in_row(14)
-    if w.button(f"Open {entry.title} and discard them", primary=True):
-        state.sure = None
-        _open(ui, entry)
+    opens = w.button(f"Open {entry.title} and discard them", primary=True)
     w.in_row()
-    if w.button("Save first", icon=theme.SAVE):
-        # Saving may ask for a name, below the gallery.
+    saves = w.button("Save first", icon=theme.SAVE)
+    w.in_row()
+    if opens or saves or w.button("Cancel"):
         state.sure = None
+    if opens:
+        _open(ui, entry)
+    elif saves:  # which may ask for a name, below the gallery
         ui.show.discard("gallery")
         ui.act("save")
-    w.in_row()
-    if w.button("Cancel"):
-        state.sure = None

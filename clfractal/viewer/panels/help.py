@@ -7,6 +7,7 @@ from itertools import groupby
 from imgui_bundle import imgui
 
 from clfractal.viewer.panels import theme
+from clfractal.viewer.panels.buttons import wrapped
 from clfractal.viewer.panels.ui import Ui
 
 POINTER_ROWS: tuple[tuple[str, str], ...] = (
@@ -58,47 +59,34 @@ def draw(ui: Ui) -> None:
     if "help" not in ui.show:
         return
     margin = 2 * theme.MARGIN
-    imgui.set_next_window_pos(imgui.ImVec2(margin, margin))
-    imgui.set_next_window_size(imgui.ImVec2(ui.size[0] - 2 * margin, ui.size[1] - 2 * margin))
+    wide, high = (side - 2 * margin for side in ui.size)
     imgui.set_next_window_bg_alpha(0.93)
-    flags = (
-        imgui.WindowFlags_.no_title_bar
-        | imgui.WindowFlags_.no_resize
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_saved_settings
-    )
-    imgui.begin("##help", None, flags)
-    with theme.font("bold", 18.0):
-        imgui.text("Keys and pointer")
-    hint = f"{ui.keys.hint('help')} or {ui.keys.hint('cancel')} closes"
-    imgui.same_line(imgui.get_window_width() - imgui.calc_text_size(hint).x - 20)
-    imgui.text_colored(theme.vec(theme.DIM), hint)
-    imgui.dummy(imgui.ImVec2(0, 4))
-    count = max(1, min(4, int((ui.size[0] - 2 * margin) // 380)))
-    size = 12.5
-    if imgui.begin_table("##keys", count):
-        for column in columns_of(blocks(ui), count):
-            imgui.table_next_column()
-            for title, rows in column:
-                _block(title, rows, size)
-        imgui.end_table()
-    imgui.end()
+    with theme.window("help", (margin, margin), (wide, high)):
+        with theme.font("bold", 18.0):
+            imgui.text("Keys and pointer")
+        hint = f"{ui.keys.hint('help')} or {ui.keys.hint('cancel')} closes"
+        imgui.same_line(imgui.get_window_width() - imgui.calc_text_size(hint).x - 20)
+        imgui.text_colored(theme.vec(theme.DIM), hint)
+        imgui.dummy(imgui.ImVec2(0, 4))
+        count = max(1, min(4, int(wide // 380)))
+        if imgui.begin_table("##keys", count):
+            for column in columns_of(blocks(ui), count):
+                imgui.table_next_column()
+                for title, rows in column:
+                    _block(title, rows)
+            imgui.end_table()
 
 
-def _block(title: str, rows: list[Row], size: float) -> None:
-    with theme.font("bold", size + 1):
+def _block(title: str, rows: list[Row]) -> None:
+    with theme.font("bold", 13.5):
         imgui.text_colored(theme.vec(theme.ACCENT), title)
-    with theme.font(size=size), theme.measures(item_spacing=(6.0, 3.0)):
+    with theme.font(size=12.5), theme.measures(item_spacing=(6.0, 3.0)):
         keys_width = 138.0
         for keys, told in rows:
             start = imgui.get_cursor_pos()
-            imgui.push_text_wrap_pos(start.x + keys_width - 8)
-            imgui.text_colored(theme.vec(theme.TEXT), keys)
-            imgui.pop_text_wrap_pos()
+            wrapped(keys, start.x + keys_width - 8)
             after = imgui.get_cursor_pos_y()
             imgui.set_cursor_pos(imgui.ImVec2(start.x + keys_width, start.y))
-            imgui.push_text_wrap_pos(0.0)
-            imgui.text_colored(theme.vec(theme.DIM), told)
-            imgui.pop_text_wrap_pos()
+            wrapped(told, color=theme.DIM)
             imgui.set_cursor_pos(imgui.ImVec2(start.x, max(after, imgui.get_cursor_pos_y())))
     imgui.dummy(imgui.ImVec2(0, 5))

@@ -5,13 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.viewer.history import Kind, Step
 from clfractal.viewer.panels import right_dock, theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import area, clipped
-from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.ui import Ui
 
 _NAMES: dict[Kind, tuple[str, str, str]] = {
@@ -26,38 +25,39 @@ def draw(ui: Ui) -> None:
     """Draws the panel, if it is open."""
     if "history" not in ui.show:
         return
-    with right_dock.window(ui, "history", "Steps and bookmarks", theme.HISTORY):
-        imgui.begin_child("##history", imgui.ImVec2(0, 0))
+    with (
+        right_dock.window(ui, "history", "Steps and bookmarks", theme.HISTORY),
+        imgui_ctx.begin_child("##history", imgui.ImVec2(0, 0)),
+    ):
         for kind in _NAMES:
             _stack(ui, kind)
         _bookmarks(ui)
-        imgui.end_child()
 
 
 # Steps
 
 
 def _stack(ui: Ui, kind: Kind) -> None:
-    title, undo, redo = _NAMES[kind]
     done, undone = ui.studio.history.depth(kind)
-    imgui.align_text_to_frame_padding()
     with theme.font("bold", 13.0):
-        imgui.text_colored(theme.vec(theme.TEXT), title)
+        w.beside(_NAMES[kind][0])
     w.in_row(8)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.FAINT), f"{done} back, {undone} forth")
+    w.beside(f"{done} back, {undone} forth", theme.FAINT)
     imgui.same_line(
         imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - 2 * imgui.get_frame_height() - 3
     )
-    hint = ui.keys.hint(undo)
-    if w.icon_button(theme.UNDO, f"Undo ({hint})", name=undo, enabled=done > 0):
-        ui.act(undo)
-    w.in_row(3)
-    if w.icon_button(theme.REDO, f"Redo ({ui.keys.hint(redo)})", name=redo, enabled=undone > 0):
-        ui.act(redo)
+    buttons(ui, kind)
     steps, now = ui.studio.history.steps(kind)
     _steps(ui, kind, steps, now)
     imgui.dummy(imgui.ImVec2(0, 3))
+
+
+def buttons(ui: Ui, kind: Kind) -> None:
+    """The buttons that undo and redo steps of a stack."""
+    (done, undone), (_, undo, redo) = ui.studio.history.depth(kind), _NAMES[kind]
+    w.act(ui, undo, theme.UNDO, "Undo", enabled=done > 0)
+    w.in_row(3)
+    w.act(ui, redo, theme.REDO, "Redo", enabled=undone > 0)
 
 
 def _steps(ui: Ui, kind: Kind, steps: list[Step], now: int) -> None:
@@ -70,12 +70,11 @@ def _steps(ui: Ui, kind: Kind, steps: list[Step], now: int) -> None:
     moved = ui.memory.get(key) != (len(steps), now)
     ui.memory[key] = (len(steps), now)
     for number in range(len(steps) + 1):
-        text = (
-            _label(ui, steps[number - 1]) if number else "As it was opened" if len(steps) < 500 else "Earlier"
-        )
+        first = "As it was opened" if len(steps) < 500 else "Earlier"
         if not imgui.is_rect_visible(imgui.ImVec2(10, line)) and number != now:
             imgui.dummy(imgui.ImVec2(1, line - 5))
             continue
+        text = _label(ui, steps[number - 1]) if number else first
         if _row(f"{kind}.{number}", text, number == now, faint=number > now):
             go_to(ui, kind, number)
         if number == now and moved:
@@ -94,7 +93,7 @@ def _row(name: str, text: str, here: bool, *, faint: bool) -> bool:
         back = theme.ACCENT_FAINT if here else theme.FRAME_HOVERED
         draw_list.add_rect_filled(imgui.ImVec2(corner.x - 2, corner.y - 1), far, theme.packed(back), 4.0)
     color = theme.ACCENT if here else theme.FAINT if faint else theme.TEXT
-    draw_list.add_text(imgui.ImVec2(corner.x + 4, corner.y), theme.packed(color), clipped(text, wide - 8))
+    draw_list.add_text(imgui.ImVec2(corner.x + 4, corner.y), theme.packed(color), w.clipped(text, wide - 8))
     return bool(clicked)
 
 
@@ -109,12 +108,11 @@ def go_to(ui: Ui, kind: Kind, number: int) -> None:
 def _label(ui: Ui, step: Step) -> str:
     """A step in few words; made once for what a step is at the moment."""
     kept: dict[int, tuple[Any, str]] = ui.memory.setdefault("history.labels", {})
-    known = kept.get(id(step))
-    if known is None or known[0] is not step.after:
+    if kept.get(id(step), (None, ""))[0] is not step.after:
         if len(kept) > 2000:
             kept.clear()
-        known = kept[id(step)] = (step.after, label(step))
-    return known[1]
+        kept[id(step)] = (step.after, label(step))
+    return kept[id(step)][1]
 
 
 def label(step: Step) -> str:
@@ -123,7 +121,7 @@ def label(step: Step) -> str:
         return _bookmark_label(step.before["bookmarks"], step.after["bookmarks"])
     found: list[tuple[str, Any]] = []
     for name in step.after:
-        found += changes(name, plain(step.before[name]), plain(step.after[name]))
+        found += changes(name, w.plain(step.before[name]), w.plain(step.after[name]))
     if len(found) > _MOST_PATHS:
         return _listed([_section(name) for name in step.after])
     return ", ".join(f"{_place(path)}{_value(value)}" for path, value in found)
@@ -191,7 +189,7 @@ def _value(value: Any) -> str:
 def _bookmarks(ui: Ui) -> None:
     marks = dict(ui.studio.scene.bookmarks)
     with theme.font("bold", 13.0):
-        imgui.text_colored(theme.vec(theme.TEXT), "Bookmarks")
+        imgui.text("Bookmarks")
     w.in_row(8)
     imgui.text_colored(theme.vec(theme.FAINT), f"{len(marks)}")
     for number, name in enumerate(marks, 1):
@@ -201,21 +199,19 @@ def _bookmarks(ui: Ui) -> None:
 
 
 def _bookmark(ui: Ui, number: int, name: str) -> None:
-    imgui.push_id(f"bookmark.{number}")
-    side = imgui.get_frame_height()
-    hint = ui.keys.hint(f"bookmark_{number}") if number <= 9 else ""
-    if w.icon_button(theme.BOOKMARK, f"Go there ({hint})" if hint else "Go there", name="go"):
-        go_to_bookmark(ui, number, name)
-    w.in_row(4)
-    width = imgui.get_content_region_avail().x - side - 4
-    new = w.text_box(ui, f"bookmark.{name}", name, width)
-    w.tip("Its name: click to change it")
-    if new is not None:
-        rename(ui, name, new)
-    w.in_row(4)
-    if w.icon_button(theme.TRASH, "Delete it", name="delete"):
-        delete(ui, name)
-    imgui.pop_id()
+    about = ui.with_key("Go there", f"bookmark_{number}") if number <= 9 else "Go there"
+    with imgui_ctx.push_id(f"bookmark.{number}"):
+        if w.icon_button(theme.BOOKMARK, about, name="go"):
+            go_to_bookmark(ui, number, name)
+        w.in_row(4)
+        width = imgui.get_content_region_avail().x - imgui.get_frame_height() - 4
+        new = w.text_box(ui, f"bookmark.{name}", name, width)
+        w.tip("Its name: click to change it")
+        if new is not None:
+            rename(ui, name, new)
+        w.in_row(4)
+        if w.icon_button(theme.TRASH, "Delete it", name="delete"):
+            delete(ui, name)
 
 
 def _add(ui: Ui, marks: Mapping[str, Any]) -> None:
@@ -249,24 +245,26 @@ def go_to_bookmark(ui: Ui, number: int, name: str) -> None:
 def add(ui: Ui, name: str) -> bool:
     """Keeps the present camera under a name; whether that was possible."""
     marks = _plain_marks(ui)
-    if name in marks:
-        ui.studio.problems["bookmarks"] = f"there is a bookmark {name!r} already"
-        return False
-    return _put(ui, {**marks, name: plain(ui.studio.scene.camera)})
+    return _is_free(ui, name) and _put(ui, {**marks, name: w.plain(ui.studio.scene.camera)})
 
 
 def rename(ui: Ui, old: str, new: str) -> bool:
     """Gives a bookmark another name; its place in the order stays."""
-    marks, new = _plain_marks(ui), new.strip()
-    if new != old and new in marks:
-        ui.studio.problems["bookmarks"] = f"there is a bookmark {new!r} already"
-        return False
-    return _put(ui, {new if name == old else name: camera for name, camera in marks.items()})
+    marks, new = _plain_marks(ui).items(), new.strip()
+    renamed = {new if name == old else name: camera for name, camera in marks}
+    return (new == old or _is_free(ui, new)) and _put(ui, renamed)
 
 
 def delete(ui: Ui, name: str) -> bool:
     """Forgets a bookmark."""
     return _put(ui, {each: camera for each, camera in _plain_marks(ui).items() if each != name})
+
+
+def _is_free(ui: Ui, name: str) -> bool:
+    free = name not in ui.studio.scene.bookmarks
+    if not free:
+        ui.studio.problems["bookmarks"] = f"there is a bookmark {name!r} already"
+    return free
 
 
 def _plain_marks(ui: Ui) -> dict[str, Any]:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
-from clfractal.viewer.panels import theme
-from clfractal.viewer.panels.buttons import area, clipped, hover
+from clfractal.viewer.panels import buttons, theme
+from clfractal.viewer.panels.buttons import Line, clipped, wrapped
 from clfractal.viewer.panels.number_box import Boxes
 from clfractal.viewer.panels.ui import Ui
 
@@ -43,10 +43,7 @@ def word(text: str) -> str:
 
 def boxes(ui: Ui) -> Boxes:
     """The memory of all number boxes."""
-    found = ui.memory.get("boxes")
-    if found is None:
-        found = ui.memory["boxes"] = Boxes()
-    return found
+    return ui.kept("boxes", Boxes)
 
 
 # Searching
@@ -63,8 +60,19 @@ def searched(ui: Ui) -> str:
 
 
 def found(ui: Ui, label: str, path: str = "") -> bool:
-    """Whether something that is no row, such as an editor, is to be drawn: nothing is searched for, or it."""
-    return _matches(ui, label, path)
+    """Whether a row, or something else such as an editor, is to be drawn: nothing is searched for, or it."""
+    wanted = filtering(ui)
+    if not wanted:
+        return True
+    heading, name = ui.memory.get("heading", ("", "")), str(ui.memory.get("group", ""))
+    matches = all(each in f"{label} {path} {heading[1]} {name}".lower() for each in wanted.split())
+    if matches:
+        ui.memory.setdefault("hits", {})[heading[0]] = True
+        ui.memory.setdefault("filter.drawn", set()).add(path)
+        if name and not ui.memory.get("group.drawn"):
+            title(name)
+            ui.memory["group.drawn"] = True
+    return matches
 
 
 def search(ui: Ui, key: str, prompt: str, width: float = -1.0) -> str:
@@ -82,21 +90,6 @@ def search(ui: Ui, key: str, prompt: str, width: float = -1.0) -> str:
     return str(text)
 
 
-def _matches(ui: Ui, label: str, path: str) -> bool:
-    wanted = filtering(ui)
-    if not wanted:
-        return True
-    heading, name = ui.memory.get("heading", ("", "")), str(ui.memory.get("group", ""))
-    matches = all(each in f"{label} {path} {heading[1]} {name}".lower() for each in wanted.split())
-    if matches:
-        ui.memory.setdefault("hits", {})[heading[0]] = True
-        ui.memory.setdefault("filter.drawn", set()).add(path)
-        if name and not ui.memory.get("group.drawn"):
-            title(name)
-            ui.memory["group.drawn"] = True
-    return matches
-
-
 # Rows
 
 
@@ -107,7 +100,7 @@ def row(
     path: str = "",
     tip: str = "",
     differs: bool = False,
-    reset: Callable[[], None] | None = None,
+    reset: Callable[[], object] | None = None,
 ) -> float | None:
     """Draws a label and goes to the place of its widget; the width that this has, points.
 
@@ -119,26 +112,24 @@ def row(
         differs: whether it is not the default; then a dot is shown, which sets it back.
         reset: sets it back.
     """
-    if not _matches(ui, label, path):
+    if not found(ui, label, path):
         return None
     corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
     whole = imgui.get_content_region_avail().x
     wide = max(whole * LABELS - GUTTER, 20.0)
     draw = imgui.get_window_draw_list()
-    imgui.push_id(path or label)
-    if imgui.invisible_button("##dot", imgui.ImVec2(GUTTER, height)) and differs and reset is not None:
-        reset()
-    hovered = imgui.is_item_hovered()
-    if differs:
-        middle = imgui.ImVec2(corner.x + 3.5, corner.y + height / 2)
-        draw.add_circle_filled(middle, 3.6 if hovered else 2.6, theme.packed(theme.ACCENT))
-        hover("Not the default: click to set it back")
-    imgui.same_line(0, 0)
-    imgui.invisible_button("##label", imgui.ImVec2(wide, height))
-    if imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0) and reset is not None:
-        reset()
-    _describe(label, path, tip, differs)
-    imgui.pop_id()
+    with imgui_ctx.push_id(path or label):
+        wanted = imgui.invisible_button("##dot", imgui.ImVec2(GUTTER, height)) and differs
+        if differs:
+            middle = imgui.ImVec2(corner.x + 3.5, corner.y + height / 2)
+            radius = 3.6 if imgui.is_item_hovered() else 2.6
+            draw.add_circle_filled(middle, radius, theme.packed(theme.ACCENT))
+            buttons.tip("Not the default: click to set it back")
+        imgui.same_line(0, 0)
+        imgui.invisible_button("##label", imgui.ImVec2(wide, height))
+        if reset is not None and (wanted or (imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0))):
+            reset()
+        _describe(label, path, tip, differs)
     color = theme.TEXT if imgui.is_item_hovered() else theme.DIM
     text = clipped(label, wide - 4)
     top = corner.y + (height - imgui.get_font_size()) / 2
@@ -155,7 +146,7 @@ def in_labels() -> None:
 def columns(count: int, spacing: float = 4.0) -> float:
     """Goes to a new line for several widgets side by side over the whole width; the width of each, points."""
     imgui.new_line()
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + GUTTER)
+    in_labels()
     return float(imgui.get_content_region_avail().x - spacing * (count - 1)) / count
 
 
@@ -167,34 +158,26 @@ def in_row(spacing: float = 6.0) -> None:
 def problem(ui: Ui, path: str) -> None:
     """What was wrong with the value that was last tried at a path, for some seconds."""
     text = ui.studio.problems.get(path)
-    times = ui.memory.setdefault("problem.times", {})
-    if text is None:
-        times.pop(path, None)
-        return
-    now = imgui.get_time()
-    known = times.get(path)
-    if known is None or known[0] != text:
-        known = times[path] = (text, now)
-    if now - known[1] > PROBLEM_SECONDS:
+    times: dict[str, tuple[str | None, float]] = ui.memory.setdefault("problem.times", {})
+    if times.get(path, (None, 0.0))[0] != text:
+        times[path] = (text, imgui.get_time())
+    if text is not None and imgui.get_time() - times[path][1] <= PROBLEM_SECONDS:
+        warn(text)
+    else:
         ui.studio.problems.pop(path, None)
-        return
-    warn(text)
 
 
 def warn(text: str) -> None:
     """A line that tells what is wrong."""
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + GUTTER)
-    with theme.colors(text=theme.WARNING):
-        _wrapped(text)
+    in_labels()
+    wrapped(text, color=theme.WARNING)
 
 
 def hint(ui: Ui, text: str) -> None:
     """A line of explanation; hidden while something is searched for."""
-    if filtering(ui):
-        return
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + GUTTER)
-    with theme.colors(text=theme.DIM):
-        _wrapped(text)
+    if not filtering(ui):
+        in_labels()
+        wrapped(text, color=theme.DIM)
 
 
 def group(ui: Ui, name: str) -> None:
@@ -236,38 +219,28 @@ def header(ui: Ui, key: str, title: str, icon: str = "", *, summary: str = "", o
     if wanted and not whole:
         scene = (wanted, ui.studio.scene.renderer.type)
         if ui.memory.get("hits.of") != scene:
-            ui.memory["hits.of"], ui.memory["hits"] = scene, {}
-            ui.memory["hits.seen"] = set()
+            ui.memory |= {"hits.of": scene, "hits": {}, "hits.seen": set()}
         seen = ui.memory["hits.seen"]
         if key in seen and not ui.memory["hits"].get(key):
             return False
         seen.add(key)
     states = ui.memory.setdefault("open", {})
     is_open = bool(states.get(key, opened))
-    corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height() + 3
-    wide = imgui.get_content_region_avail().x
-    if area(f"##{key}.heading", (wide, height)) and not wanted:
+    line = Line(f"{key}.heading", None, imgui.get_frame_height() + 3)
+    if line.clicked and not wanted:
         is_open = states[key] = not is_open
-    hovered = imgui.is_item_hovered()
-    draw = imgui.get_window_draw_list()
-    far = imgui.ImVec2(corner.x + wide, corner.y + height)
-    draw.add_rect_filled(
-        corner, far, theme.packed(theme.FRAME_HOVERED if hovered else theme.HEADER), theme.ROUNDING
+    back = theme.FRAME_HOVERED if line.hovered else theme.HEADER
+    line.draw.add_rect_filled(
+        line.corner, line.at(line.wide, line.height), theme.packed(back), theme.ROUNDING
     )
     is_open = is_open or bool(wanted)
-    y = corner.y + (height - imgui.get_font_size()) / 2
-    tint = theme.ACCENT if is_open else theme.DIM
-    draw.add_text(imgui.ImVec2(corner.x + 9, y), theme.packed(tint), icon)
+    line.write(9, icon, theme.ACCENT if is_open else theme.DIM)
     with theme.font("bold"):
-        draw.add_text(imgui.ImVec2(corner.x + 31, y), theme.packed(theme.TEXT), title)
+        line.write(31, title)
         used = 31 + imgui.calc_text_size(title).x
-    caret = theme.OPENED if is_open else theme.CLOSED
-    draw.add_text(imgui.ImVec2(far.x - 17, y), theme.packed(theme.DIM), caret)
+    line.write(line.wide - 17, theme.OPENED if is_open else theme.CLOSED, theme.DIM)
     if summary:
-        text = clipped(summary, wide - used - 34)
-        draw.add_text(
-            imgui.ImVec2(far.x - 25 - imgui.calc_text_size(text).x, y), theme.packed(theme.FAINT), text
-        )
+        line.write(-25, clipped(summary, line.wide - used - 34), theme.FAINT)
     return is_open
 
 
@@ -277,23 +250,14 @@ def header(ui: Ui, key: str, title: str, icon: str = "", *, summary: str = "", o
 def _describe(label: str, path: str, text: str, differs: bool) -> None:
     if not imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip) or not imgui.begin_tooltip():
         return
-    imgui.push_text_wrap_pos(280)
     with theme.font("bold"):
-        imgui.text_unformatted(label)
+        wrapped(label, 280)
     if text:
         # In files a value is null; here it is switched off.
-        imgui.text_unformatted((text[:1].upper() + text[1:]).replace("null:", "off:"))
+        wrapped((text[:1].upper() + text[1:]).replace("null:", "off:"), 280)
     if path:
-        with theme.colors(text=theme.FAINT), theme.font("fixed", 12.5):
-            imgui.text_unformatted(path)
+        with theme.font("fixed", 12.5):
+            wrapped(path, 280, theme.FAINT)
     if differs:
-        with theme.colors(text=theme.ACCENT):
-            imgui.text_unformatted("Double click: back to the default")
-    imgui.pop_text_wrap_pos()
+        wrapped("Double click: back to the default", 280, theme.ACCENT)
     imgui.end_tooltip()
-
-
-def _wrapped(text: str) -> None:
-    imgui.push_text_wrap_pos(0.0)
-    imgui.text_unformatted(text)
-    imgui.pop_text_wrap_pos()

@@ -11,6 +11,8 @@ from clfractal.viewer.panels import palette_editor, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
+# No name that a material may have.
+_NONE, _NEW = "", " "
 _MOST_POINTS = 256
 _HEIGHT = 54.0
 
@@ -18,6 +20,24 @@ _HEIGHT = 54.0
 def material(ui: Ui, name: str) -> None:
     """Every field of a material, and what its maps consist of."""
     w.section(ui, f"materials.{name}", of_map=draw)
+
+
+def choice(ui: Ui, path: str, now: str | None, none: str, color: list[float] | None) -> None:
+    """Which of the scene's materials something at a path has; one more can be made.
+
+    Args:
+        now: the present one.
+        none: the words for none of them.
+        color: of one that is made.
+    """
+    names = ui.studio.scene.materials
+    words = {_NONE: none, **{name: name for name in names}, _NEW: "New material"}
+    found = w.pick(ui, "Material", words, now or _NONE, path=path, tip=w.value_tip(ui, path), listed=True)
+    if found == _NEW:
+        made = next(name for name in (f"material {n}" for n in range(1, 1000)) if name not in names)
+        ui.studio.edit({f"materials.{made}": {"base": {"color": color}}, path: made})
+    elif found is not None:
+        w.put(ui, path, None if found == _NONE else found)
 
 
 def draw(ui: Ui, path: str, found: Map) -> None:
@@ -38,21 +58,14 @@ def _curve(ui: Ui, path: str, points: tuple[tuple[float, float], ...]) -> None:
         # A point stays between its neighbours.
         low = points[index - 1][0] if index else 0.0
         high = points[index + 1][0] if index + 1 < len(points) else 1.0
+        where, scale = f"{path}.{index}.0", w.Scale(low, high, (0, 1))
         about = "place in the range, 0 to 1"
-        w.number(
-            ui,
-            f"{path}.{index}.0",
-            f"Point {index + 1}",
-            at,
-            w.Scale(low, high, (0, 1)),
-            default=None,
-            tip=about,
-        )
+        w.number(ui, where, f"Point {index + 1}", at, scale, default=None, tip=about)
         w.number(ui, f"{path}.{index}.1", "Value", value, w.Scale(), default=None, tip="the value there")
     w.problem(ui, path)
     if w.filtering(ui):
         return
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     plain = [list(point) for point in points]
     if w.icon_button(theme.PLUS, "Add a point", name=f"{path}.more", enabled=len(points) < _MOST_POINTS):
         ui.studio.edit({path: with_point(plain)})
@@ -69,7 +82,7 @@ def with_point(points: list[list[float]]) -> list[list[float]]:
 
 
 def _draw_curve(points: tuple[tuple[float, float], ...]) -> None:
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     imgui.dummy(imgui.ImVec2(width, _HEIGHT))
     draw = imgui.get_window_draw_list()

@@ -56,22 +56,13 @@ def draw(ui: Ui) -> None:
     """Draws the bar, if panels are shown."""
     if "panels" not in ui.show:
         return
-    imgui.set_next_window_pos(
-        imgui.ImVec2(ui.size[0] - theme.MARGIN, theme.MARGIN), imgui.Cond_.always, imgui.ImVec2(1.0, 0.0)
-    )
-    flags = (
-        imgui.WindowFlags_.no_decoration
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_saved_settings
-        | imgui.WindowFlags_.always_auto_resize
-        | imgui.WindowFlags_.no_bring_to_front_on_focus
-        | imgui.WindowFlags_.no_focus_on_appearing
-        | imgui.WindowFlags_.no_nav
-    )
-    with theme.measures(window_padding=(5.0, 5.0)):
-        imgui.begin("##menu", None, flags)
-    bare = theme.colors(frame_bg=theme.PANEL, border=theme.LINE)
-    with bare, theme.measures(item_spacing=(2.0, 2.0)):
+    flags = theme.BACK | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_nav
+    place = (ui.size[0] - theme.MARGIN, theme.MARGIN)
+    with (
+        theme.window("menu", place, flags=flags, pivot=(1.0, 0.0), window_padding=(5.0, 5.0)),
+        theme.colors(frame_bg=theme.PANEL, border=theme.LINE),
+        theme.measures(item_spacing=(2.0, 2.0)),
+    ):
         for number, group in enumerate(_GROUPS):
             if number:
                 _gap()
@@ -79,7 +70,6 @@ def draw(ui: Ui) -> None:
                 if place:
                     w.in_row(2)
                 _button(ui, button)
-    imgui.end()
 
 
 def _gap() -> None:
@@ -97,11 +87,9 @@ def _gap() -> None:
 
 def _button(ui: Ui, button: _Button) -> None:
     about, on, enabled = button.about, bool(button.part) and button.part in ui.show, True
-    history, stereo = ui.studio.history, ui.studio.scene.stereo
-    if button.action == "undo":
-        enabled = history.depth("scene")[0] > 0
-    elif button.action == "redo":
-        enabled = history.depth("scene")[1] > 0
+    stereo = ui.studio.scene.stereo
+    if button.action in ("undo", "redo"):
+        enabled = ui.studio.history.depth("scene")[button.action == "redo"] > 0
     elif button.action == "next_stereo":
         on = stereo is not None
         mode = stereo.mode.replace("_", " ") if stereo is not None else "off"
@@ -113,11 +101,8 @@ def _button(ui: Ui, button: _Button) -> None:
     elif button.action == "render_still":
         running = sum(1 for still in ui.studio.stills if not still.finished)
         about = f"{about}; {running} under way" if running else about
-    hint = ui.keys.hint(button.action)
-    text = f"{about} ({hint})" if hint else about
-    if w.icon_button(button.icon, text, name=button.action, on=on, enabled=enabled):
-        ui.act(button.action)
-        if button.action == "panels" and hint:
-            ui.studio.tell(f"{hint} shows the panels again")
+    clicked = w.act(ui, button.action, button.icon, about, on=on, enabled=enabled)
+    if clicked and button.action == "panels" and (hint := ui.keys.hint("panels")):
+        ui.studio.tell(f"{hint} shows the panels again")
     if button.action == "next_stereo" and imgui.is_item_clicked(imgui.MouseButton_.right):
         ui.act("previous_stereo")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, reduce
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
@@ -16,6 +16,7 @@ from clfractal.schema.base import Section
 from clfractal.schema.fields import Usual, known
 from clfractal.schema.kinds import OneOf
 from clfractal.schema.mapped import Map
+from clfractal.viewer.editing import child, plain
 
 Kind = Literal["number", "whole", "flag", "choice", "text", "vector", "color", "section", "other"]
 
@@ -78,24 +79,9 @@ class Target:
 
 def find(scene: Scene, path: str) -> Target | None:
     """The value at a dotted path; None where a section on the way is null or missing."""
-    holder: Any = scene
     *parts, last = path.split(".")
-    for part in parts:
-        holder = _child(holder, part)
-        if holder is None:
-            return None
-    return Target(holder, last, _child(holder, last))
-
-
-def plain(value: Any) -> Any:
-    """A value of a scene as plain data: lists, mappings, numbers, words."""
-    if isinstance(value, Section):
-        return value.model_dump(mode="json")
-    if isinstance(value, (tuple, list)):
-        return [plain(each) for each in value]
-    if isinstance(value, dict):
-        return {name: plain(each) for name, each in value.items()}
-    return value
+    holder: Any = reduce(child, parts, scene)
+    return Target(holder, last, child(holder, last)) if holder is not None else None
 
 
 @cache
@@ -115,6 +101,38 @@ def by_magnitude(usual: tuple[float, float]) -> bool:
     return usual[0] > 0 and usual[1] / usual[0] > _DECADES
 
 
+def has_default(meta: Meta) -> bool:
+    """Whether a value has one; those that have to be given have none."""
+    return meta.default is not None or meta.optional
+
+
+def differs(target: Target, meta: Meta) -> bool:
+    """Whether a value is not its default; those that have to be given have none."""
+    return has_default(meta) and bool(plain(target.value) != meta.default)
+
+
+def first_value(meta: Meta, start: Any = None) -> Any:
+    """A value for a field that was null and is now to be set: `start`, its default, or the middle of its usual range."""
+    if start is not None:
+        return plain(start)
+    if meta.default is not None:
+        return meta.default
+    by_kind: dict[str, Any] = {
+        "choice": next(iter(meta.choices), None),
+        "vector": [0.0, 0.0, 1.0] if meta.size == 3 else [0.5] * meta.size,
+        "color": [1.0, 1.0, 1.0],
+        "text": "",
+        "flag": True,
+    }
+    if meta.kind in by_kind:
+        return by_kind[meta.kind]
+    middle = 1.0
+    if meta.usual is not None:
+        low, high = meta.usual
+        middle = float(f"{(low * high) ** 0.5:.2g}") if meta.log else (low + high) / 2
+    return round(middle) if meta.kind == "whole" else middle
+
+
 def all_sections() -> list[type[Section]]:
     """Every class of section that a scene may hold, the scene's own first."""
     found: list[type[Section]] = [Scene]
@@ -129,16 +147,6 @@ def sections_of(section: type[Section], name: str) -> list[type[Section]]:
     """The classes of sections that a field may hold, also as entries of a list or mapping; those of maps are left out."""
     inner = dict.fromkeys(_sections_in(section.model_fields[name].annotation))
     return [each for each in inner if not issubclass(each, Map)]
-
-
-def _child(holder: Any, name: str) -> Any:
-    if isinstance(holder, Section):
-        return getattr(holder, name, None)
-    if isinstance(holder, dict):
-        return holder.get(name)
-    if isinstance(holder, (tuple, list)) and name.isdecimal() and int(name) < len(holder):
-        return holder[int(name)]
-    return None
 
 
 def _meta(section: type[Section], name: str, field: FieldInfo) -> Meta:

@@ -138,19 +138,14 @@ def typed_number(text: str, scale: Scale) -> float | None:
 
     None if it is no number.
     """
-    cleaned = text.strip().replace("\u2212", "-")
-    unit = scale.unit.strip()
-    if unit and cleaned.endswith(unit):
-        cleaned = cleaned[: -len(unit)].strip()
+    cleaned = text.strip().replace("\u2212", "-").removesuffix(scale.unit.strip()).strip()
     if "." not in cleaned and cleaned.count(",") == 1:
         cleaned = cleaned.replace(",", ".")
     try:
         found = _value(ast.parse(cleaned[:200], mode="eval").body) / scale.factor
     except (SyntaxError, ValueError, ArithmeticError, TypeError, RecursionError, MemoryError):
         return None
-    if not math.isfinite(found):
-        return None
-    return float(round(found)) if scale.whole else found
+    return None if not math.isfinite(found) else float(round(found)) if scale.whole else found
 
 
 def moved_by(start: float, travel: float, width: float, scale: Scale) -> float:
@@ -190,14 +185,11 @@ def _moved_freely(start: float, travel: float, scale: Scale) -> float:
 
 
 def _within(value: float, scale: Scale) -> float:
+    beside = 1e-3 * (scale.usual[1] - scale.usual[0] if scale.usual is not None else 1e-3)
     if scale.low is not None and value <= scale.low:
-        value = scale.low
-        if scale.open[0]:
-            value += 1e-3 * (scale.usual[1] - scale.usual[0] if scale.usual is not None else 1e-3)
+        value = scale.low + scale.open[0] * beside
     if scale.high is not None and value >= scale.high:
-        value = scale.high
-        if scale.open[1]:
-            value -= 1e-3 * (scale.usual[1] - scale.usual[0] if scale.usual is not None else 1e-3)
+        value = scale.high - scale.open[1] * beside
     return value
 
 
@@ -306,12 +298,8 @@ def _draw(
         draw.add_rect_filled(low, imgui.ImVec2(corner.x + 3, high.y), theme.packed(mark), 2.0)
     text, size = _fitting(value, scale, width - 8)
     draw.push_clip_rect(low, high, True)
-    left = corner.x + max((width - size.x) / 2, 6.0)
-    draw.add_text(
-        imgui.ImVec2(left, corner.y + (height - size.y) / 2),
-        theme.packed(theme.TEXT, _opacity()),
-        text,
-    )
+    place = imgui.ImVec2(corner.x + max((width - size.x) / 2, 6.0), corner.y + (height - size.y) / 2)
+    draw.add_text(place, theme.packed(theme.TEXT, imgui.get_style().alpha), text)
     draw.pop_clip_rect()
 
 
@@ -323,10 +311,6 @@ def _fitting(value: float, scale: Scale, width: float) -> tuple[str, Any]:
         if size.x <= width:
             break
     return text, size
-
-
-def _opacity() -> float:
-    return float(imgui.get_style().alpha)
 
 
 def bar_part(value: float, scale: Scale) -> float | None:

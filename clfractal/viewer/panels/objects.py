@@ -10,14 +10,10 @@ from imgui_bundle import imgui
 from clfractal.scene.object_checks import can_show
 from clfractal.scene.objects import KINDS, MAX_OBJECTS, FormulaObject, VolumeObject, WaterObject
 from clfractal.schema.shape import Joined, ObjectBase
-from clfractal.viewer.panels import first, formula, formula_library, maps, theme, transfer
+from clfractal.viewer.panels import first, formula, formula_library, maps, theme, transfer, volume
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import area
-from clfractal.viewer.panels.metadata import plain
 from clfractal.viewer.panels.ui import Ui
 
-# No name that a material may have.
-PHONG, NEW = "", " "
 _IN_A_ROW = 3
 _GRIDS, _MOST_FILES = (".nrrd", ".nhdr", ".npy"), 50
 _KINDS: dict[str, str] = {kind.tag: kind.title for kind in KINDS}
@@ -57,22 +53,13 @@ def draw(ui: Ui) -> None:
 
 def _line(name: str, each: ObjectBase, chosen: bool) -> bool:
     """One object of the list; whether it was clicked."""
-    corner, height = imgui.get_cursor_screen_pos(), imgui.get_frame_height()
-    wide = imgui.get_content_region_avail().x
-    clicked = area(f"##object {name}", (wide, height))
-    draw = imgui.get_window_draw_list()
-    if chosen or imgui.is_item_hovered():
-        back = theme.ACCENT_FAINT if chosen else theme.FRAME
-        far = imgui.ImVec2(corner.x + wide, corner.y + height)
-        draw.add_rect_filled(corner, far, theme.packed(back), 5.0)
-    y = corner.y + (height - imgui.get_font_size()) / 2
-    text = each.title
-    right = corner.x + wide - imgui.calc_text_size(text).x - 8
-    draw.push_clip_rect(corner, imgui.ImVec2(right - 6, corner.y + height), True)
-    draw.add_text(imgui.ImVec2(corner.x + 11, y), theme.packed(theme.TEXT), name)
-    draw.pop_clip_rect()
-    draw.add_text(imgui.ImVec2(right, y), theme.packed(theme.DIM), text)
-    return bool(clicked)
+    line = w.Line(f"object {name}", chosen)
+    room = line.wide - imgui.calc_text_size(each.title).x - 8
+    line.draw.push_clip_rect(line.corner, line.at(room - 6, line.height), True)
+    line.write(11, name)
+    line.draw.pop_clip_rect()
+    line.write(-8, each.title, theme.DIM)
+    return line.clicked
 
 
 def _buttons(ui: Ui, chosen: str | None) -> None:
@@ -82,7 +69,7 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
         if number % _IN_A_ROW:
             w.in_row(4)
         else:
-            imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+            w.in_labels()
         about = _ABOUT.get(kind, f"Add a {kind}")
         possible = room and can_show(ui.studio.scene.renderer.type, kind)
         if w.button(_KINDS[kind], icon=theme.PLUS, enabled=possible, about=about):
@@ -91,13 +78,14 @@ def _buttons(ui: Ui, chosen: str | None) -> None:
                 imgui.open_popup("##grids")
             else:
                 _add(ui, kind, {"type": kind, **first.objects(ui)[kind]})
-    file = _file_popup(ui)
+    files = {str(file): str(file) for file in ui.memory.get("grid files", [])}
+    file = w.menu("##grids", files, none="No .nrrd or .npy file lies beside the scene")
     if file is not None:
         _add(ui, "volume", {"type": "volume", "file": file, **first.objects(ui)["volume"]})
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove", enabled=chosen is not None):
-        left = {name: plain(each) for name, each in objects.items() if name != chosen}
-        planes = [plain(plane) for plane in ui.studio.scene.cut_planes]
+        left = {name: w.plain(each) for name, each in objects.items() if name != chosen}
+        planes = [w.plain(plane) for plane in ui.studio.scene.cut_planes]
         for plane in planes:
             plane["objects"] = [name for name in plane["objects"] if name != chosen]
         ui.studio.edit({"objects": left, "cut_planes": planes})
@@ -116,20 +104,6 @@ def grid_files(folder: Path) -> list[str]:
         path for pattern in ("*", "*/*") for path in folder.glob(pattern) if path.suffix.lower() in _GRIDS
     ]
     return sorted(path.relative_to(folder).as_posix() for path in found if path.is_file())[:_MOST_FILES]
-
-
-def _file_popup(ui: Ui) -> str | None:
-    """The grid that is chosen of those beside the scene, once it is."""
-    chosen = None
-    if imgui.begin_popup("##grids"):
-        files = ui.memory.get("grid files", [])
-        if not files:
-            imgui.text("No .nrrd or .npy file lies beside the scene")
-        for file in files:
-            if imgui.selectable(file, False)[0]:
-                chosen = str(file)
-        imgui.end_popup()
-    return chosen
 
 
 def _object(ui: Ui, name: str) -> None:
@@ -157,7 +131,7 @@ def _formula(ui: Ui, name: str, each: FormulaObject) -> None:
     """Which formula it is, from the library; its parameters and iterations."""
     path, chain = f"objects.{name}.formula", ui.studio.scene.joined_chains[name]
     if not w.filtering(ui):
-        imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+        w.in_labels()
         text = formula_library.titles().get(each.formula.name or "", chain.title or "Own formula")
         if w.button(f"{text}##{path}", width=-1, about="Choose another formula"):
             imgui.open_popup(f"##library {path}")
@@ -180,27 +154,9 @@ def _volume(ui: Ui, path: str, each: VolumeObject) -> None:
     if each.is_cloud:
         w.field(ui, f"{path}.anisotropy")
         return
-    middle = (grid.low + grid.high) / 2
-    w.field(
-        ui,
-        f"{path}.level",
-        usual=(grid.low, grid.high),
-        start=middle,
-        auto=f"{middle:.4g}, the middle",
-    )
+    volume.level(ui, f"{path}.level", grid.low, grid.high)
 
 
 def _material(ui: Ui, path: str, each: ObjectBase) -> None:
-    scene = ui.studio.scene
-    width = w.row(ui, "Material", path=f"{path}.material", tip=w.value_tip(ui, f"{path}.material"))
-    if width is None:
-        return
-    words = {PHONG: "The set's", **{name: name for name in scene.materials}, NEW: "New material"}
-    found = w.choose(f"{path}.material", words, each.material or PHONG, width)
-    if found == NEW:
-        made = next(name for name in (f"material {n}" for n in range(1, 1000)) if name not in scene.materials)
-        color = list(scene.material.color)
-        ui.studio.edit({f"materials.{made}": {"base": {"color": color}}, f"{path}.material": made})
-    elif found is not None:
-        ui.studio.edit({f"{path}.material": None if found == PHONG else found})
-    w.problem(ui, f"{path}.material")
+    color = list(ui.studio.scene.material.color)
+    maps.choice(ui, f"{path}.material", each.material, "The set's", color)

@@ -15,7 +15,7 @@ from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer import zoom_box
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.panels import stereo as stereo_panel
-from clfractal.viewer.panels import theme
+from clfractal.viewer.panels import theme, volume
 from clfractal.viewer.panels.timeline_area import room_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.picking import Pick
@@ -59,13 +59,13 @@ def _picture(ui: Ui) -> list[Pair]:
             found.append(("frames", f"{ui.speed.frames:.0f}/s"))
         width, height = frame.arrangement.size(ui.studio.look)
         coarse = f", 1/{frame.divider}" if frame.divider > 1 else ""
-        found.append(("size", f"{width} x {height}{coarse}"))
-        total = frame.job.samples
         state = "" if frame.finished else ", paused" if session.paused else ""
-        found.append(("samples", f"{frame.samples} of {total}{state}"))
-        found.append(("number", frame.job.precision))
-    found.append(("device", session.device.info.name))
-    found.append(("picture", ui.speed.way))
+        found += [
+            ("size", f"{width} x {height}{coarse}"),
+            ("samples", f"{frame.samples} of {frame.job.samples}{state}"),
+            ("number", frame.job.precision),
+        ]
+    found += [("device", session.device.info.name), ("picture", ui.speed.way)]
     if ui.studio.region is not None:
         found.append(("region", "{2} x {3} at {0}, {1}".format(*ui.studio.region)))
     return found
@@ -76,30 +76,31 @@ def _scene(ui: Ui) -> list[Pair]:
     renderer = scene.renderer
     found: list[Pair] = [("iterations", f"{scene.formula.iterations}")]
     if isinstance(renderer, SurfaceRenderer):
-        found.append(("method", f"{renderer.search}, {renderer.normal.replace('_', ' ')}"))
-        found.append(("step", _step(scene, renderer)))
+        method = f"{renderer.search}, {renderer.normal.replace('_', ' ')}"
+        found += [("method", method), ("step", _step(scene, renderer))]
     elif isinstance(renderer, VolumeRenderer):
-        found.append(("method", f"volume, {renderer.value}, {renderer.normals.replace('_', ' ')}"))
-        found.append(("step", f"{renderer.step:g} voxels"))
-        found.append(("zoom", number_text(renderer.magnification)))
-        box = _marked(ui)
+        found += [
+            ("method", f"volume, {renderer.value}, {renderer.normals.replace('_', ' ')}"),
+            ("step", f"{renderer.step:g} voxels"),
+            ("zoom", number_text(renderer.magnification)),
+        ]
+        box = volume.marked(ui)
         if box is not None:
             found.append(("new zoom", number_text(zoom_box.next_magnification(renderer, box))))
     elif isinstance(renderer, CutPlaneRenderer):
-        found.append(("method", "cut plane"))
-        found.append(("plane", f"{renderer.plane.placed.height:.4g} high"))
+        found += [("method", "cut plane"), ("plane", f"{renderer.plane.placed.height:.4g} high")]
     pick = ui.pick
     on_plane = point_on_plane(pick) if pick is not None else None
     if pick is not None and on_plane is not None:
-        found.append(("point", ", ".join(f"{each:.6g}" for each in on_plane)))
-        found.append(("count", _count(ui, pick, on_plane)))
+        place = ", ".join(f"{each:.6g}" for each in on_plane)
+        found += [("point", place), ("count", _count(ui, pick, on_plane))]
     elif isinstance(renderer, CutPlaneRenderer):
         found += [("point", "-"), ("count", "-")]
     else:
-        hit = pick is not None and pick.point is not None
-        found.append(("depth", f"{pick.depth:.5g}" if pick is not None and hit else "-"))
-        if pick is not None and pick.point is not None:
-            found.append(("point", ", ".join(f"{each:.4g}" for each in pick.point)))
+        point = pick.point if pick is not None else None
+        found.append(("depth", f"{pick.depth:.5g}" if pick is not None and point is not None else "-"))
+        if point is not None:
+            found.append(("point", ", ".join(f"{each:.4g}" for each in point)))
     return found
 
 
@@ -119,12 +120,6 @@ def _step(scene: Scene, renderer: SurfaceRenderer) -> str:
     return f"{scene.bounds[1] / 100 if renderer.step is None else renderer.step:.4g}"
 
 
-def _marked(ui: Ui) -> zoom_box.ZoomBox | None:
-    """The box of the next zoom, if it is shown."""
-    controls = ui.memory.get("controls")
-    return controls.box if controls is not None and controls.marking else None
-
-
 def _stereo(ui: Ui) -> list[Pair]:
     stereo = ui.studio.scene.stereo
     assert stereo is not None
@@ -136,16 +131,10 @@ def _stereo(ui: Ui) -> list[Pair]:
     if ui.comfort is not None:
         found.append(("depth", stereo_panel.range_text(ui.comfort)))
     if "parallax" in ui.show or ui.pick is not None:
-        found.append(("parallax", _parallax(ui)))
+        under = stereo_panel.under_pointer(ui)
+        text = "{:+.4g}, {:+.2f} degrees".format(*under) if under is not None else "-"
+        found.append(("parallax", text))
     return found
-
-
-def _parallax(ui: Ui) -> str:
-    found = stereo_panel.under_pointer(ui)
-    if found is None:
-        return "-"
-    on_screen, angle = found
-    return f"{on_screen:+.4g}, {angle:+.2f} degrees"
 
 
 def seconds_text(seconds: float) -> str:
@@ -251,18 +240,8 @@ def _state(ui: Ui, left: float, bottom: float) -> None:
         room = ui.size[0] - left - theme.MARGIN - 20
         size = imgui.calc_text_size(text, False, room)
         top = bottom - size.y - 10
-        canvas.add_rect_filled(
-            imgui.ImVec2(left, top),
-            imgui.ImVec2(left + min(size.x, room) + 20, bottom),
-            theme.packed(theme.PANEL, 0.9),
-            theme.ROUNDING,
-        )
-        canvas.add_text(
-            imgui.get_font(),
-            imgui.get_font_size(),
-            imgui.ImVec2(left + 10, top + 5),
-            theme.packed(color),
-            text,
-            room if math.isfinite(room) else 0.0,
-        )
+        far = imgui.ImVec2(left + min(size.x, room) + 20, bottom)
+        canvas.add_rect_filled(imgui.ImVec2(left, top), far, theme.packed(theme.PANEL, 0.9), theme.ROUNDING)
+        place, font = imgui.ImVec2(left + 10, top + 5), (imgui.get_font(), imgui.get_font_size())
+        canvas.add_text(*font, place, theme.packed(color), text, room if math.isfinite(room) else 0.0)
         bottom = top - 6

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.errors import ClfractalError
 from clfractal.files.srgb import encode
@@ -18,9 +18,8 @@ from clfractal.scene.palettes import PALETTES
 from clfractal.schema.stops import Stop
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import area
 from clfractal.viewer.panels.color_button import shown
-from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.stops import MOST, SEGMENTS, color_at, dragged, draw_strip, state_of, without
 from clfractal.viewer.panels.ui import Ui
 
 _FAMILIAR = (
@@ -40,7 +39,6 @@ _FAR = 34.0
 """A stop that is dragged so far from its strip is removed."""
 _FIRST_STOPS = 9
 _MOST_FOUND = 40
-_SEGMENTS = 64
 
 
 def draw(ui: Ui, path: str) -> None:
@@ -57,16 +55,16 @@ def draw(ui: Ui, path: str) -> None:
         if w.icon_button(theme.PENCIL, "Edit its colours", name=f"{path}.edit"):
             ui.studio.edit({path: stops_of(palette)})
     elif w.icon_button(theme.EXCHANGE, "Reverse", name=f"{path}.reverse"):
-        ui.studio.edit({path: reversed_stops(plain(palette))})
+        ui.studio.edit({path: reversed_stops(w.plain(palette))})
     _list(ui, path)
     palette = w.value(ui, path)
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     wide = imgui.get_content_region_avail().x
     if isinstance(palette, str):
         strip(ui, palette, wide, 14.0)
         _reverse_named(ui, path, palette)
     else:
-        _editor(ui, path, plain(palette), wide)
+        _editor(ui, path, w.plain(palette), wide)
     w.problem(ui, path)
 
 
@@ -113,7 +111,7 @@ def distributed(stops: list[dict[str, Any]]) -> list[dict[str, Any]]:
 def moved(stops: list[dict[str, Any]], index: int, at: float) -> tuple[list[dict[str, Any]], int]:
     """The stops with one at another place, in order again, and that one's new index."""
     one = {**stops[index], "at": round(min(max(at, 0.0), 1.0), 4)}
-    others = [stop for number, stop in enumerate(stops) if number != index]
+    others = without(stops, index)
     place = sum(
         stop["at"] < one["at"] or (stop["at"] == one["at"] and n < index) for n, stop in enumerate(others)
     )
@@ -122,10 +120,8 @@ def moved(stops: list[dict[str, Any]], index: int, at: float) -> tuple[list[dict
 
 def added(stops: list[dict[str, Any]], at: float) -> tuple[list[dict[str, Any]], int]:
     """The stops with one more, in the colour that the palette has there, and its index."""
-    places = [stop["at"] for stop in stops]
-    color = [float(f"{np.interp(at, places, [s['color'][axis] for s in stops]):.4g}") for axis in range(3)]
-    place = sum(each <= at for each in places)
-    return [*stops[:place], {"at": round(at, 4), "color": color}, *stops[place:]], place
+    place = sum(stop["at"] <= at for stop in stops)
+    return [*stops[:place], {"at": round(at, 4), "color": color_at(stops, at)}, *stops[place:]], place
 
 
 @lru_cache(maxsize=400)
@@ -150,9 +146,9 @@ def _known() -> list[str]:
 
 
 def _reverse_named(ui: Ui, path: str, palette: str) -> None:
-    width = w.row(ui, "Reversed", tip="from its other end", path=f"{path}.reversed")
-    if width is not None and w.toggle(f"{path}.reversed", palette.endswith("_r")):
-        ui.studio.edit({path: palette.removesuffix("_r") if palette.endswith("_r") else f"{palette}_r"})
+    on, place = palette.endswith("_r"), f"{path}.reversed"
+    if w.switch(ui, "Reversed", on, path=place, tip="from its other end"):
+        w.put(ui, path, palette.removesuffix("_r") if on else f"{palette}_r")
 
 
 def _list(ui: Ui, path: str) -> None:
@@ -161,38 +157,28 @@ def _list(ui: Ui, path: str) -> None:
     if not imgui.begin_popup(f"##{path}.list"):
         return
     text = w.search(ui, "palette.search", "Find among all palettes").strip().lower()
-    found = (
-        [*PALETTES, *_FAMILIAR]
-        if not text
-        else [each for each in _known() if text in each.lower()][:_MOST_FOUND]
-    )
-    imgui.begin_child("##palettes", imgui.ImVec2(0, 0))
-    wide = imgui.get_content_region_avail().x
-    for name in found:
-        corner = imgui.get_cursor_screen_pos()
-        if area(f"##{name}", (wide, 26)):
-            ui.studio.edit({path: name})
-            imgui.close_current_popup()
-        if imgui.is_item_hovered():
-            far = imgui.ImVec2(corner.x + wide, corner.y + 26)
-            imgui.get_window_draw_list().add_rect_filled(corner, far, theme.packed(theme.FRAME_HOVERED), 5.0)
-        after = imgui.get_cursor_screen_pos()
-        y = corner.y + (26 - imgui.get_font_size()) / 2
-        imgui.get_window_draw_list().add_text(
-            imgui.ImVec2(corner.x + 6, y), theme.packed(theme.TEXT), name.split(":")[-1]
-        )
-        imgui.set_cursor_screen_pos(imgui.ImVec2(corner.x + 96, corner.y + 6))
-        strip(ui, name, wide - 102, 14)
-        imgui.set_cursor_screen_pos(after)
-        imgui.dummy(imgui.ImVec2(0, 0))
-    imgui.end_child()
+    found = [each for each in _known() if text in each.lower()][:_MOST_FOUND]
+    with imgui_ctx.begin_child("##palettes", imgui.ImVec2(0, 0)):
+        for name in found if text else (*PALETTES, *_FAMILIAR):
+            line = w.Line(name, None, 26)
+            if line.clicked:
+                ui.studio.edit({path: name})
+                imgui.close_current_popup()
+            if line.hovered:
+                color = theme.packed(theme.FRAME_HOVERED)
+                line.draw.add_rect_filled(line.corner, line.at(line.wide, 26), color, 5.0)
+            after = imgui.get_cursor_screen_pos()
+            line.write(6, name.split(":")[-1])
+            imgui.set_cursor_screen_pos(line.at(96, 6))
+            strip(ui, name, line.wide - 102, 14)
+            imgui.set_cursor_screen_pos(after)
+            imgui.dummy(imgui.ImVec2(0, 0))
     imgui.end_popup()
 
 
 def _editor(ui: Ui, path: str, stops: list[dict[str, Any]], width: float) -> None:
     """A strip with a handle for each stop."""
-    state = ui.memory.setdefault(f"{path}.editor", {"chosen": 0, "held": False})
-    state["chosen"] = min(state["chosen"], len(stops) - 1)
+    state = state_of(ui, f"{path}.editor", stops)
     stops = _strip_events(ui, path, stops, width, state)
     chosen = state["chosen"]
     w.group(ui, f"Stop {chosen + 1} of {len(stops)}")
@@ -207,19 +193,18 @@ def _editor(ui: Ui, path: str, stops: list[dict[str, Any]], width: float) -> Non
             ui.studio.end_gesture()
     if w.filtering(ui):
         return
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     if w.button("Distribute", about="All stops at equal distances"):
         ui.studio.edit({path: distributed(stops)})
     w.in_row(4)
-    if w.icon_button(
-        theme.PLUS, "Add a stop beside this one (or double click the strip)", enabled=len(stops) < 256
-    ):
+    about = "Add a stop beside this one (or double click the strip)"
+    if w.icon_button(theme.PLUS, about, enabled=len(stops) < MOST):
         other = stops[chosen + 1] if chosen + 1 < len(stops) else stops[chosen - 1]
         new, state["chosen"] = added(stops, (stops[chosen]["at"] + other["at"]) / 2)
         ui.studio.edit({path: new})
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove this stop (or drag it off the strip)", enabled=len(stops) > 2):
-        _remove(ui, path, stops, chosen)
+        ui.studio.edit({path: without(stops, chosen)})
 
 
 def _strip_events(
@@ -231,27 +216,18 @@ def _strip_events(
     mouse, hovered = imgui.get_mouse_pos(), imgui.is_item_hovered()
     at = min(max((mouse.x - left) / inner, 0.0), 1.0)
     near = min(range(len(stops)), key=lambda n: abs(stops[n]["at"] - at))
-    within_reach = abs(stops[near]["at"] - at) * inner <= _HANDLE + 2
-    if imgui.is_item_activated():
-        if within_reach:
-            state.update(chosen=near, held=True, before=stops)
-        elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
-            stops, state["chosen"] = added(stops, at)
-            ui.studio.edit({path: stops})
-    if imgui.is_item_active() and state["held"] and imgui.is_mouse_dragging(0, 2.0):
-        stops, state["chosen"] = moved(stops, state["chosen"], at)
-        ui.studio.edit({path: stops}, gesture=path)
     off = abs(mouse.y - corner.y - _STRIP / 2) > _FAR and len(stops) > 2
-    leaving = state["held"] and off
-    if imgui.is_item_deactivated() and state["held"]:
-        state["held"] = False
-        if leaving:
-            kept = [stop for number, stop in enumerate(stops) if number != state["chosen"]]
-            ui.studio.edit({path: kept}, gesture=path)
-            stops, state["chosen"] = kept, max(state["chosen"] - 1, 0)
-        ui.studio.end_gesture()
-        leaving = False
-    _draw_strip(stops, (left, corner.y), inner, state["chosen"], leaving)
+    stops = dragged(
+        ui,
+        path,
+        stops,
+        state,
+        near=near if abs(stops[near]["at"] - at) * inner <= _HANDLE + 2 else None,
+        add=lambda: added(stops, at),
+        move=lambda: moved(stops, state["chosen"], at),
+        off=off,
+    )
+    _draw_strip(stops, (left, corner.y), inner, state["chosen"], state["held"] and off)
     if hovered and not state["held"]:
         w.tip("Drag a stop; double click to add one; drag it off the strip to remove it")
     return stops
@@ -260,22 +236,10 @@ def _strip_events(
 def _draw_strip(
     stops: list[dict[str, Any]], corner: tuple[float, float], width: float, chosen: int, leaving: bool
 ) -> None:
-    draw = imgui.get_window_draw_list()
-    left, top = corner
-    places = np.linspace(0, 1, _SEGMENTS + 1)
-    at = [stop["at"] for stop in stops]
+    draw, (left, top) = imgui.get_window_draw_list(), corner
+    places, at = np.linspace(0, 1, SEGMENTS + 1), [stop["at"] for stop in stops]
     table = np.stack([np.interp(places, at, [s["color"][axis] for s in stops]) for axis in range(3)], axis=1)
-    codes = [theme.packed((*map(float, row), 1.0)) for row in encode(np.clip(table, 0, 1))]
-    for number in range(_SEGMENTS):
-        x, after = left + width * places[number], left + width * places[number + 1]
-        draw.add_rect_filled_multi_color(
-            imgui.ImVec2(x, top),
-            imgui.ImVec2(after + 0.5, top + _STRIP),
-            codes[number],
-            codes[number + 1],
-            codes[number + 1],
-            codes[number],
-        )
+    draw_strip(corner, width, _STRIP, table)
     order = [*(n for n in range(len(stops)) if n != chosen), chosen]
     for number in order:
         if number == chosen and leaving:
@@ -288,7 +252,3 @@ def _draw_strip(
         draw.add_triangle_filled(*(imgui.ImVec2(*each) for each in points), theme.packed(edge))
         draw.add_rect_filled(low, high, theme.packed((*codes_of, 1.0)), 2.0)
         draw.add_rect(low, high, theme.packed(edge), 2.0)
-
-
-def _remove(ui: Ui, path: str, stops: list[dict[str, Any]], index: int) -> None:
-    ui.studio.edit({path: [stop for number, stop in enumerate(stops) if number != index]})

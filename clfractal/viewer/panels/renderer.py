@@ -13,7 +13,6 @@ from clfractal.scene.sampled import Sampled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.metadata import metas, plain
 from clfractal.viewer.panels.ui import Ui
 
 KINDS = {word: kind.title for word, kind in RENDERERS.items()}
@@ -27,11 +26,10 @@ def summary(ui: Ui) -> str:
 def draw(ui: Ui) -> None:
     """Draws the panel."""
     scene = ui.studio.scene
-    width = w.row(ui, "Show", path="renderer.type", tip="a surface, a grid of voxels, or a plane that cuts")
-    if width is not None:
-        found = w.segments("renderer.type", KINDS, scene.renderer.type, width)
-        if found is not None:
-            switch(ui, found)
+    about = "a surface, a grid of voxels, or a plane that cuts"
+    found = w.pick(ui, "Show", KINDS, scene.renderer.type, path="renderer.type", tip=about)
+    if found is not None:
+        switch(ui, found)
     w.problem(ui, "renderer")
     _samples(ui)
     if isinstance(ui.studio.scene.renderer, SurfaceRenderer):
@@ -47,9 +45,9 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
         changes: its values at paths, set along with it.
     """
     scene = ui.studio.scene
-    now = plain(scene.renderer)
+    now = w.plain(scene.renderer)
     kept = ui.memory.setdefault("renderer.kept", {})
-    kept[now["type"]] = {"renderer": now, "cut_planes": plain(scene.cut_planes)}
+    kept[now["type"]] = {"renderer": now, "cut_planes": w.plain(scene.cut_planes)}
     known = kept.get(kind, {})
     other = RENDERERS[kind]
     first: dict[str, Any] = {"type": kind, **other.first}
@@ -72,7 +70,7 @@ def switch(ui: Ui, kind: str, changes: dict[str, Any] | None = None) -> bool:
 
 def _objects_of(ui: Ui, kind: str) -> dict[str, Any]:
     """The objects that another renderer shows; those that it does not show come back with one that does."""
-    now = {name: plain(each) for name, each in ui.studio.scene.objects.items()}
+    now = {name: w.plain(each) for name, each in ui.studio.scene.objects.items()}
     # Those of another scene, whose history was another one, do not.
     history, before, hidden = ui.memory.get("renderer.objects", (None, {}, set()))
     if history is not ui.studio.history:
@@ -112,59 +110,35 @@ def _surface(ui: Ui, renderer: SurfaceRenderer) -> None:
         own = scene.chain.step_scale
         w.field(ui, "renderer.step_scale", start=own, auto=f"{own:.3g}, the formula's")
     w.field(ui, "renderer.max_steps")
-    _bounds(ui, renderer)
+    chain = scene.chain
+    first = {"center": list(chain.center), "radius": float(f"{chain.radius:.4g}")}
+    if w.optional(ui, "renderer.bounds", "Own bounds", first, keeps=False):
+        w.fields(ui, "renderer.bounds", ("center", "radius"))
     w.group(ui, "Normals")
     # Normals of a grid need its points, so one choice would not do without the other.
     w.field(ui, "renderer.normal", keep={"renderer.points": None})
     _points(ui, renderer)
     w.group(ui, "Light")
     w.fields(ui, "renderer", ("bounces", "firefly_limit"), firefly_limit={"auto": "no limit"})
-    _section(ui, "renderer.ambient_occlusion", "Occlusion", {})
-    if renderer.ambient_occlusion is not None:
+    if w.optional(ui, "renderer.ambient_occlusion", "Occlusion", {}, keeps=False):
         w.field(ui, "renderer.ambient_occlusion.rays")
         half = radius / 2
         w.field(ui, "renderer.ambient_occlusion.distance", start=half, auto=f"{half:.3g}")
 
 
-def _bounds(ui: Ui, renderer: SurfaceRenderer) -> None:
-    chain = ui.studio.scene.chain
-    first = {"center": list(chain.center), "radius": float(f"{chain.radius:.4g}")}
-    _section(ui, "renderer.bounds", "Own bounds", first)
-    if renderer.bounds is not None:
-        w.fields(ui, "renderer.bounds", ("center", "radius"))
-
-
 def _points(ui: Ui, renderer: SurfaceRenderer) -> None:
-    used = renderer.used_points
-    _section(ui, "renderer.points", "Points", {"pattern": used.pattern, "count": used.count})
-    if renderer.points is None:
+    used, path = renderer.used_points, "renderer.points.count"
+    first = {"pattern": used.pattern, "count": used.count}
+    if not w.optional(ui, "renderer.points", "Points", first, keeps=False) or renderer.points is None:
         return
     w.field(ui, "renderer.points.pattern", segmented=True)
     if renderer.points.pattern == "stochastic":
-        w.field(ui, "renderer.points.count")
+        w.field(ui, path)
         return
-    width = w.row(ui, "Count", path="renderer.points.count", tip="number of points per pixel")
-    if width is not None:
-        words = {n * n: f"{n} x {n}" for n in (1, 2, 3, 4, 5, 6, 7, 8)}
-        found = w.choose("renderer.points.count", words, renderer.points.count, width)
-        if found is not None:
-            ui.studio.edit({"renderer.points.count": found})
-        w.problem(ui, "renderer.points.count")
-
-
-def _section(ui: Ui, path: str, label: str, first: dict[str, Any]) -> None:
-    """The switch of a section that may be null."""
-    given = w.value(ui, path) is not None
-    meta = metas(type(ui.studio.scene.renderer))[path.rsplit(".", 1)[1]]
-    reset = (lambda: _put(ui, path, None)) if given else None
-    width = w.row(ui, label, path=path, tip=meta.description, differs=given, reset=reset)
-    if width is not None and w.toggle(path, given):
-        _put(ui, path, None if given else first)
-    w.problem(ui, path)
-
-
-def _put(ui: Ui, path: str, value: Any) -> None:
-    ui.studio.edit({path: value})
+    words, about = {n * n: f"{n} x {n}" for n in range(1, 9)}, "number of points per pixel"
+    found = w.pick(ui, "Count", words, renderer.points.count, path=path, tip=about, listed=True)
+    if found is not None:
+        w.put(ui, path, found)
 
 
 def _region(ui: Ui) -> None:
@@ -172,7 +146,7 @@ def _region(ui: Ui) -> None:
         w.field(ui, "renderer.periodicity")
     region = ui.studio.region
     imgui.dummy(imgui.ImVec2(0, 2))
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    w.in_labels()
     if region is None:
         if w.button("Refine a rectangle", icon=theme.CROP, width=-1, about="Then drag it in the picture"):
             ui.act("region")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import takewhile
 
 from imgui_bundle import imgui
 
@@ -45,12 +46,11 @@ def fit(ui: Ui) -> None:
 def place(ui: Ui, part: str) -> tuple[float, float, float, float]:
     """Left, top, width and height of a part that is open, points."""
     top, bottom = _span(ui)
-    shown = [name for name in _PARTS if name in ui.show]
-    before = shown[: shown.index(part)]
-    left_over = bottom - top - theme.MARGIN * (len(shown) - 1) - sum(_PARTS[name][0] for name in shown)
-    total = sum(_PARTS[name][1] for name in shown)
-    high = {name: max(_PARTS[name][0] + left_over * _PARTS[name][1] / total, 80.0) for name in shown}
-    top += sum(high[name] + theme.MARGIN for name in before)
+    shown = {name: least_share for name, least_share in _PARTS.items() if name in ui.show}
+    left_over = bottom - top - theme.MARGIN * (len(shown) - 1) - sum(least for least, _ in shown.values())
+    total = sum(share for _, share in shown.values())
+    high = {name: max(least + left_over * share / total, 80.0) for name, (least, share) in shown.items()}
+    top += sum(high[name] + theme.MARGIN for name in takewhile(lambda name: name != part, shown))
     return ui.size[0] - theme.MARGIN - width_of(ui), top, width_of(ui), high[part]
 
 
@@ -65,27 +65,13 @@ def _span(ui: Ui) -> tuple[float, float]:
 def window(ui: Ui, part: str, title: str, icon: str) -> Iterator[None]:
     """The window of a part that is open, with its title and a button that closes it."""
     left, top, width, height = place(ui, part)
-    imgui.set_next_window_pos(imgui.ImVec2(left, top))
-    imgui.set_next_window_size(imgui.ImVec2(width, height))
-    flags = (
-        imgui.WindowFlags_.no_decoration
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_saved_settings
-        | imgui.WindowFlags_.no_scroll_with_mouse
-        | imgui.WindowFlags_.no_bring_to_front_on_focus
-        | imgui.WindowFlags_.no_focus_on_appearing
-    )
-    imgui.begin(f"##{part}", None, flags)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(theme.ACCENT), icon)
-    w.in_row(7)
-    with theme.font("bold"):
-        imgui.text(title)
-    imgui.same_line(width - 10 - imgui.get_frame_height())
-    if w.icon_button(theme.CROSS, "Close", name=f"{part}.close"):
-        ui.show.discard(part)
-    imgui.dummy(imgui.ImVec2(0, 1))
-    try:
+    with theme.window(part, (left, top), (width, height), flags=theme.BACK):
+        w.beside(icon, theme.ACCENT)
+        w.in_row(7)
+        with theme.font("bold"):
+            imgui.text(title)
+        imgui.same_line(width - 10 - imgui.get_frame_height())
+        if w.icon_button(theme.CROSS, "Close", name=f"{part}.close"):
+            ui.show.discard(part)
+        imgui.dummy(imgui.ImVec2(0, 1))
         yield
-    finally:
-        imgui.end()

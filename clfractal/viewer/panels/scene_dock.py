@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.panels import (
@@ -17,6 +17,7 @@ from clfractal.viewer.panels import (
     elsewhere,
     formula,
     formula_editor,
+    history,
     keyboard,
     lights,
     material,
@@ -79,49 +80,25 @@ def draw(ui: Ui) -> None:
 
 
 def _dock(ui: Ui) -> None:
-    width = min(theme.DOCK_LEFT, ui.size[0] - 2 * theme.MARGIN)
-    imgui.set_next_window_pos(imgui.ImVec2(theme.MARGIN, theme.MARGIN))
-    imgui.set_next_window_size(imgui.ImVec2(width, ui.size[1] - 2 * theme.MARGIN))
-    flags = (
-        imgui.WindowFlags_.no_title_bar
-        | imgui.WindowFlags_.no_resize
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_collapse
-        | imgui.WindowFlags_.no_saved_settings
-        | imgui.WindowFlags_.no_scrollbar
-        | imgui.WindowFlags_.no_scroll_with_mouse
-        | imgui.WindowFlags_.no_bring_to_front_on_focus
-    )
+    width, high = min(theme.DOCK_LEFT, ui.size[0] - 2 * theme.MARGIN), ui.size[1] - 2 * theme.MARGIN
+    flags = theme.BACK & ~imgui.WindowFlags_.no_focus_on_appearing
     keyboard.focus_window(ui)
-    imgui.begin("##scene", None, flags)
-    _top(ui)
-    # A gutter at the right, so that the scroll bar never covers or moves a widget.
-    flattened, bar = imgui.ChildFlags_.nav_flattened, imgui.WindowFlags_.always_vertical_scrollbar
-    imgui.begin_child("##panels", imgui.ImVec2(0, 0), flattened, bar)
-    ui.memory["filter.drawn"] = set()
-    for panel in _PANELS:
-        if not panel.shown(ui):
-            continue
-        if w.header(ui, panel.key, panel.title, panel.icon, summary=panel.summary(ui), opened=panel.opened):
-            imgui.push_id(panel.key)
-            panel.draw(ui)
-            imgui.pop_id()
-            imgui.dummy(imgui.ImVec2(0, 3))
-    ui.memory["filter.whole"] = False
-    elsewhere.draw(ui)
-    imgui.end_child()
-    imgui.end()
-
-
-def _top(ui: Ui) -> None:
-    """Undo, redo, and the line to search with."""
-    history = ui.studio.history
-    done, undone = history.depth("scene")
-    if w.icon_button(theme.UNDO, f"Undo ({ui.keys.hint('undo')})", name="undo", enabled=done > 0):
-        ui.act("undo")
-    w.in_row(3)
-    if w.icon_button(theme.REDO, f"Redo ({ui.keys.hint('redo')})", name="redo", enabled=undone > 0):
-        ui.act("redo")
-    w.in_row()
-    keyboard.begin_here(ui)
-    w.search(ui, "filter", "Find a setting")
+    with theme.window("scene", (theme.MARGIN, theme.MARGIN), (width, high), flags=flags):
+        history.buttons(ui, "scene")
+        w.in_row()
+        keyboard.begin_here(ui)
+        w.search(ui, "filter", "Find a setting")
+        # A gutter at the right, so that the scroll bar never covers or moves a widget.
+        flattened, bar = imgui.ChildFlags_.nav_flattened, imgui.WindowFlags_.always_vertical_scrollbar
+        imgui.begin_child("##panels", imgui.ImVec2(0, 0), flattened, bar)
+        ui.memory["filter.drawn"] = set()
+        for panel in filter(lambda panel: panel.shown(ui), _PANELS):
+            if w.header(
+                ui, panel.key, panel.title, panel.icon, summary=panel.summary(ui), opened=panel.opened
+            ):
+                with imgui_ctx.push_id(panel.key):
+                    panel.draw(ui)
+                imgui.dummy(imgui.ImVec2(0, 3))
+        ui.memory["filter.whole"] = False
+        elsewhere.draw(ui)
+        imgui.end_child()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -33,8 +34,14 @@ MODES = {
     "pair": "Two files",
     "multi_view": "One EXR, two views",
 }
-_CENTIMETRES = {"unit": " cm", "factor": 100.0}
-_MILLIMETRES = {"unit": " mm", "factor": 1000.0}
+_OPTIONS: dict[str, dict[str, Any]] = {
+    "mode": {"words": MODES},
+    "swap": {"label": "Swap eyes"},
+    "screen_width": {"label": "Screen width", "unit": " cm", "factor": 100.0},
+    "screen_distance": {"label": "Distance", "unit": " cm", "factor": 100.0},
+    "interpupillary_distance": {"label": "Between the eyes", "unit": " mm", "factor": 1000.0},
+    "separation": {"unit": " x"},
+}
 
 
 def summary(ui: Ui) -> str:
@@ -49,20 +56,15 @@ def draw(ui: Ui) -> None:
         return
     stereo = ui.studio.scene.stereo
     assert stereo is not None
-    w.field(ui, "stereo.mode", words=MODES)
-    if stereo.mode == "anaglyph":
-        w.field(ui, "stereo.glasses")
-        w.field(ui, "stereo.method")
+    glasses = ("glasses", "method") if stereo.mode == "anaglyph" else ()
+    w.fields(ui, "stereo", ("mode", *glasses), **_OPTIONS)
     if stereo.mode == "anaglyph_chessboard":
         _filters(ui, stereo)
-    w.field(ui, "stereo.swap", "Swap eyes")
+    w.fields(ui, "stereo", ("swap",), **_OPTIONS)
     w.group(ui, "Screen and viewer")
-    w.field(ui, "stereo.screen_width", "Screen width", **_CENTIMETRES)  # type: ignore[arg-type]
-    w.field(ui, "stereo.screen_distance", "Distance", **_CENTIMETRES)  # type: ignore[arg-type]
-    w.field(ui, "stereo.interpupillary_distance", "Between the eyes", **_MILLIMETRES)  # type: ignore[arg-type]
+    w.fields(ui, "stereo", ("screen_width", "screen_distance", "interpupillary_distance"), **_OPTIONS)
     w.group(ui, "Depth")
-    w.field(ui, "stereo.separation", unit=" x")
-    w.field(ui, "stereo.convergence")
+    w.fields(ui, "stereo", ("separation", "convergence"), **_OPTIONS)
     _fit(ui, stereo)
     _plane(ui, stereo)
     if not w.filtering(ui):
@@ -73,22 +75,17 @@ def draw(ui: Ui) -> None:
 def _switch(ui: Ui) -> bool:
     scene = ui.studio.scene
     on = scene.stereo is not None
-    about = "a pair of pictures for two eyes"
-    width = w.row(ui, "Stereo", path="stereo", tip=about, differs=on, reset=lambda: _put(ui, None))
-    if width is not None and w.toggle("stereo", on):
+    about, reset = "a pair of pictures for two eyes", partial(w.put, ui, "stereo", None)
+    if w.switch(ui, "Stereo", on, path="stereo", tip=about, differs=on, reset=reset):
         if on:
             ui.memory["stereo.kept"] = ui.studio.value("stereo")
-            _put(ui, None)
+            reset()
         elif isinstance(scene.camera, OrthographicCamera) and scene.layout is None:
             ui.studio.tell("stereo needs a perspective camera", wrong=True)
         else:
-            _put(ui, ui.memory.get("stereo.kept", {"mode": "anaglyph"}))
+            w.put(ui, "stereo", ui.memory.get("stereo.kept", {"mode": "anaglyph"}))
     w.problem(ui, "stereo")
     return ui.studio.scene.stereo is not None
-
-
-def _put(ui: Ui, value: object) -> None:
-    ui.studio.edit({"stereo": value})
 
 
 def _filters(ui: Ui, stereo: Stereo) -> None:
@@ -104,9 +101,7 @@ def _fit(ui: Ui, stereo: Stereo) -> None:
     width = w.row(ui, "Fit the depth", path="stereo.fit", tip=about, differs=stereo.fit is not None)
     if width is not None:
         text = "Fitted: switch off" if stereo.fit else "Fit now"
-        hint = ui.keys.hint("fit_stereo")
-        if w.button(text, icon=theme.MAGIC, width=width, about=f"{about} ({hint})"):
-            ui.act("fit_stereo")
+        w.act(ui, "fit_stereo", theme.MAGIC, about, text=text, width=width)
     w.field(ui, "stereo.budget", unit="°")
 
 
@@ -121,22 +116,10 @@ def _plane(ui: Ui, stereo: Stereo) -> None:
         "width": float(f"{distance * stereo.screen_width / stereo.screen_distance:.5g}"),
     }
     about = "the plane in space that lies on the screen; else it goes through the camera's target"
-    given = stereo.plane is not None
-    width = w.row(ui, "Own screen plane", path="stereo.plane", tip=about, differs=given)
-    if width is not None and w.toggle("stereo.plane", given):
-        ui.studio.edit({"stereo.plane": None if given else start})
-    w.problem(ui, "stereo.plane")
-    plane = ui.studio.scene.stereo.plane if ui.studio.scene.stereo is not None else None
-    if plane is not None:
-        step = {"step": plane.width / 1000}
-        w.fields(
-            ui,
-            "stereo.plane",
-            ("center", "normal", "up", "width", "height"),
-            center=step,
-            normal={"step": 0.01},
-            up={"step": 0.01},
-        )
+    if w.optional(ui, "stereo.plane", "Own screen plane", start, tip=about, keeps=False):
+        step, names = {"step": 0.01}, ("center", "normal", "up", "width", "height")
+        center = {"step": w.value(ui, "stereo.plane.width") / 1000}
+        w.fields(ui, "stereo.plane", names, center=center, normal=step, up=step)
 
 
 def range_text(comfort: Comfort) -> str:
@@ -181,7 +164,8 @@ def under_pointer(ui: Ui) -> tuple[float, float] | None:
     scene, pick = ui.studio.shown_scene, ui.pick
     if scene.stereo is None or pick is None or pick.point is None:
         return None
-    views = _views(scene)
+    seen_by = (scene.camera, scene.stereo, scene.image)
+    views = ui.kept_for("stereo.views", seen_by, lambda: _eye_views(scene))
     if views is None:
         return None
     point = np.array([pick.point])
@@ -189,27 +173,8 @@ def under_pointer(ui: Ui) -> tuple[float, float] | None:
     return on_screen, float(geometry.degrees(scene.stereo, on_screen))
 
 
-def _views(scene: Scene) -> dict[EyeName, View] | None:
-    return _eye_views(_Same(scene))
-
-
-class _Same:
-    """A scene as a key that is equal for the same camera, stereo and size only."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.scene = scene
-        self.key = (scene.camera, scene.stereo, scene.image)
-
-    def __eq__(self, other: object) -> bool:
-        return isinstance(other, _Same) and self.key == other.key
-
-    def __hash__(self) -> int:
-        return hash(self.scene.image.width)
-
-
-@lru_cache(maxsize=4)
-def _eye_views(same: _Same) -> dict[EyeName, View] | None:
+def _eye_views(scene: Scene) -> dict[EyeName, View] | None:
     try:
-        return geometry.eye_views(same.scene)
+        return geometry.eye_views(scene)
     except ClfractalError:
         return None

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Collection, Iterable
 from dataclasses import dataclass
+from itertools import count
 from pathlib import Path
-from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import PICTURES
@@ -19,7 +19,6 @@ from clfractal.viewer.background import Still
 from clfractal.viewer.panels import layout, right_dock, theme
 from clfractal.viewer.panels import order_form as form
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.viewport import image_of
 
@@ -40,26 +39,17 @@ _ENDINGS = {
     "exr": (".exr",),
     "both": (".png", ".exr"),
 }
-_MOST_SAMPLES = 65_536
 
 
 @dataclass(slots=True)
-class Wanted:
-    """What the panel remembers.
+class Wanted(form.Wanted):
+    """What the panel remembers; without a size it is the window's, without a name a free one.
 
     Attributes:
-        size: of the picture, pixels; None: as large as the window's.
-        samples: for a pixel; None: as many as the scene says.
         kind: the one of `FORMATS`.
-        name: of the files, without ending, relative to the current folder; empty: a free one.
-        problem: why the last one could not begin, or empty.
     """
 
-    size: tuple[int, int] | None = None
-    samples: int | None = None
     kind: str = "png"
-    name: str = ""
-    problem: str = ""
 
 
 def draw(ui: Ui) -> None:
@@ -67,12 +57,15 @@ def draw(ui: Ui) -> None:
     if "stills" not in ui.show:
         return
     state: Wanted = ui.memory.setdefault("stills", Wanted())
-    with right_dock.window(ui, "stills", "Render a still", theme.CAMERA):
-        imgui.begin_child("##stills", imgui.ImVec2(0, 0))
-        _settings(ui, state)
+    with (
+        right_dock.window(ui, "stills", "Render a still", theme.CAMERA),
+        imgui_ctx.begin_child("##stills", imgui.ImVec2(0, 0)),
+    ):
+        state.size = form.size(ui, "stills", PRESETS, state.size, _window_size(ui))
+        state.samples = form.samples(ui, "stills", state.samples)
+        form.files(state, "stills", FORMATS, lambda: _suggestion(ui, state))
         _start(ui, state)
         _list(ui)
-        imgui.end_child()
 
 
 def paths_of(name: str, kind: str, folder: Path | None = None) -> tuple[Path, ...]:
@@ -88,10 +81,12 @@ def paths_of(name: str, kind: str, folder: Path | None = None) -> tuple[Path, ..
 
 def free_name(stem: str, kind: str, taken: Collection[Path], stereo: Stereo | None = None) -> str:
     """A name such as `mandelbulb-still-1` under which there is no file, and none is on its way."""
-    number = 1
-    while any(_is_taken(path, taken) for path in _all(paths_of(f"{stem}-still-{number}", kind), stereo)):
-        number += 1
-    return f"{stem}-still-{number}"
+    names = (f"{stem}-still-{number}" for number in count(1))
+    return next(
+        name
+        for name in names
+        if not any(_is_taken(path, taken) for path in _all(paths_of(name, kind), stereo))
+    )
 
 
 def check(
@@ -136,26 +131,6 @@ def on_their_way(stills: Iterable[Still]) -> set[Path]:
     }
 
 
-# Settings
-
-
-def _settings(ui: Ui, state: Wanted) -> None:
-    state.size = form.size(ui, "stills", PRESETS, state.size, _window_size(ui))
-    present = ui.studio.scene.renderer.samples
-    state.samples = form.samples(ui, "stills", state.samples, present, _MOST_SAMPLES)
-    width = form.label("Format")
-    chosen = w.choose("stills.kind", FORMATS, state.kind, width)
-    if chosen is not None:
-        state.kind, state.problem = chosen, ""
-    width = form.label("Name")
-    suggestion = _suggestion(ui, state)
-    imgui.set_next_item_width(width)
-    _, text = imgui.input_text_with_hint("##stills.name", suggestion, state.name)
-    if text != state.name:
-        state.name, state.problem = text, ""
-    w.tip(f"Without ending; in {Path.cwd()} unless a folder is given")
-
-
 def _window_size(ui: Ui) -> tuple[int, int]:
     width, height = image_of(ui.studio.scene.stereo, ui.studio.viewport)
     return width, height
@@ -163,17 +138,13 @@ def _window_size(ui: Ui) -> tuple[int, int]:
 
 def _suggestion(ui: Ui, state: Wanted) -> str:
     """A free name; looked up anew when something has changed that it depends on."""
-    files: Any = ui.memory.get("files")
-    path = files.source.path if files is not None else None
-    stem = path.stem if path is not None else "scene"
-    stereo = ui.studio.scene.stereo
+    stem, stereo = form.scene_name(ui, "scene"), ui.studio.scene.stereo
     ended = sum(1 for still in ui.studio.stills if still.finished)
     key = (stem, state.kind, stereo.mode if stereo else None, len(ui.studio.stills), ended)
-    known = ui.memory.get("stills.suggestion")
-    if known is None or known[0] != key:
-        found = free_name(stem, state.kind, on_their_way(ui.studio.stills), stereo)
-        known = ui.memory["stills.suggestion"] = (key, found)
-    return str(known[1])
+    stills = ui.studio.stills
+    return ui.kept_for(
+        "stills.suggestion", key, lambda: free_name(stem, state.kind, on_their_way(stills), stereo)
+    )
 
 
 def _start(ui: Ui, state: Wanted) -> None:
@@ -212,42 +183,16 @@ def start(ui: Ui, state: Wanted) -> Still | None:
 
 def _list(ui: Ui) -> None:
     stills = ui.studio.stills
-    if not stills:
-        return
-    imgui.dummy(imgui.ImVec2(0, 2))
-    for still in reversed(stills):
-        imgui.push_id(str(id(still)))
-        _still(ui, still)
-        imgui.pop_id()
-    ended = any(still.finished for still in stills)
-    if ended and w.button("Clear the list", about="Forgets what has ended; the files stay"):
-        ui.studio.stills[:] = [still for still in stills if not still.finished]
+    if stills and form.listed(stills, _still, ended=any(still.finished for still in stills)):
+        stills[:] = [still for still in stills if not still.finished]
 
 
-def _still(ui: Ui, still: Still) -> None:
-    side = imgui.get_frame_height()
-    wide = imgui.get_content_region_avail().x
-    icon, color = _sign(still)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.vec(color), icon)
-    w.in_row(7)
-    imgui.align_text_to_frame_padding()
-    files = _all(still.paths, still.scene.stereo)
-    room = imgui.get_content_region_avail().x - (side + 6 if not still.finished else 0)
-    imgui.text(clipped(names_of(files), room))
-    w.tip("\n".join(str(path) for path in files))
-    if not still.finished:
-        imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - side)
-        if w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
-            still.cancel()
-    if not still.finished:
-        form.bar(still.share, wide)
-    color = theme.WARNING if still.problem else theme.FAINT
-    with theme.font(size=12.5), theme.colors(text=color):
-        imgui.push_text_wrap_pos(0.0)
-        imgui.text_unformatted(state_text(still))
-        imgui.pop_text_wrap_pos()
-    imgui.dummy(imgui.ImVec2(0, 2))
+def _still(still: Still) -> None:
+    files, busy = _all(still.paths, still.scene.stereo), not still.finished
+    form.head(still, theme.PICTURE, names_of(files), "\n".join(map(str, files)), button=busy)
+    if busy and w.icon_button(theme.CROSS, "Cancel it: nothing is written", name="cancel"):
+        still.cancel()
+    form.foot(still, state_text(still), still.share if busy else None)
 
 
 def names_of(files: list[Path]) -> str:
@@ -256,14 +201,6 @@ def names_of(files: list[Path]) -> str:
     return ", ".join(
         file.suffix if place and file.stem == first.stem else file.name for place, file in enumerate(files)
     )
-
-
-def _sign(still: Still) -> tuple[str, theme.Rgba]:
-    if still.problem:
-        return theme.WARN, theme.WARNING
-    if still.written:
-        return theme.CHECK, theme.GOOD
-    return (theme.CROSS, theme.FAINT) if still.cancelled else (theme.PICTURE, theme.ACCENT)
 
 
 def state_text(still: Still) -> str:

@@ -149,6 +149,49 @@ def measures(**changes: float | tuple[float, float]) -> Iterator[None]:
         imgui.pop_style_var(len(changes))
 
 
+@contextmanager
+def window(
+    name: str,
+    place: tuple[float, float],
+    size: tuple[float, float] | None = None,
+    *,
+    flags: int = 0,
+    pivot: tuple[float, float] = (0.0, 0.0),
+    **changes: float | tuple[float, float],
+) -> Iterator[None]:
+    """A window that stays where it is, without a title.
+
+    Args:
+        place, size: points; without a size it is as large as what is in it needs.
+        flags: more of Dear ImGui's.
+        pivot: the part of the window that is at the place.
+        changes: of its own measures, as `window_padding`.
+    """
+    imgui.set_next_window_pos(imgui.ImVec2(*place), imgui.Cond_.always, imgui.ImVec2(*pivot))
+    if size is not None:
+        imgui.set_next_window_size(imgui.ImVec2(*size))
+    with measures(**changes):
+        imgui.begin(f"##{name}", None, _STILL | flags)
+    # (After a mistake in a panel Dear ImGui ends what is open: see `Viewer._draw_panels`.)
+    yield
+    imgui.end()
+
+
+_STILL = (
+    imgui.WindowFlags_.no_title_bar
+    | imgui.WindowFlags_.no_resize
+    | imgui.WindowFlags_.no_collapse
+    | imgui.WindowFlags_.no_move
+    | imgui.WindowFlags_.no_saved_settings
+)
+BACK = (
+    imgui.WindowFlags_.no_scrollbar
+    | imgui.WindowFlags_.no_scroll_with_mouse
+    | imgui.WindowFlags_.no_bring_to_front_on_focus
+    | imgui.WindowFlags_.no_focus_on_appearing
+)
+"""Flags of windows that lie below others, and neither scroll nor take the keyboard."""
+
 _MEASURES: dict[str, float | tuple[float, float]] = {
     "window_padding": (10, 10),
     "frame_padding": (7, 4),

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.scene.animation import Animation
 from clfractal.viewer import timeline_edits as timeline
 from clfractal.viewer import timeline_view
 from clfractal.viewer.panels import theme, timeline_curves, timeline_inspector, timeline_rows
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.timeline_area import BAR, LEFT, Area, height_of, left_of
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.playing import Player
@@ -34,53 +33,35 @@ def draw(ui: Ui) -> None:
     left = left_of(ui)
     width = max(ui.size[0] - left - theme.MARGIN, 100.0)
     high = height_of(ui)
-    imgui.set_next_window_pos(imgui.ImVec2(left, ui.size[1] - theme.MARGIN - high))
-    imgui.set_next_window_size(imgui.ImVec2(width, high))
-    flags = (
-        imgui.WindowFlags_.no_decoration
-        | imgui.WindowFlags_.no_move
-        | imgui.WindowFlags_.no_saved_settings
-        | imgui.WindowFlags_.no_scroll_with_mouse
-        | imgui.WindowFlags_.no_bring_to_front_on_focus
-        | imgui.WindowFlags_.no_focus_on_appearing
-        | imgui.WindowFlags_.no_nav
-    )
-    with theme.measures(window_padding=(8.0, 7.0)):
-        imgui.begin("##timeline", None, flags)
-    _buttons(ui, player, view, animation, width)
-    inspected = width >= _ROOM
-    inner = width - 16 - (_INSPECTOR + 8 if inspected else 0)
-    corner = imgui.get_cursor_screen_pos()
-    area = Area(corner.x + LEFT, max(inner - LEFT - BAR, 40.0), corner.y + _RULER)
-    _ruler(ui, player, view, animation, area, corner.y)
-    imgui.begin_child("##tracks", imgui.ImVec2(inner, 0), 0, imgui.WindowFlags_.no_nav)
-    if not animation.tracks:
-        _empty(ui)
-    elif view.curves:
-        timeline_curves.draw(ui, view, animation, area)
-    else:
-        timeline_rows.draw(ui, view, animation, area)
-    _playhead(ui, view, area, corner.y)
-    imgui.end_child()
-    _playhead(ui, view, area, corner.y)
-    if inspected:
-        imgui.set_cursor_screen_pos(imgui.ImVec2(corner.x + inner + 8, corner.y))
-        imgui.begin_child("##inspector", imgui.ImVec2(0, 0), 0, imgui.WindowFlags_.no_nav)
-        timeline_inspector.draw(ui, view, animation)
-        imgui.end_child()
-    imgui.end()
+    place, no_nav = (left, ui.size[1] - theme.MARGIN - high), imgui.WindowFlags_.no_nav
+    flags = theme.BACK | no_nav
+    with theme.window("timeline", place, (width, high), flags=flags, window_padding=(8.0, 7.0)):
+        _buttons(ui, player, view, animation, width)
+        inspected = width >= _ROOM
+        inner = width - 16 - (_INSPECTOR + 8 if inspected else 0)
+        corner = imgui.get_cursor_screen_pos()
+        area = Area(corner.x + LEFT, max(inner - LEFT - BAR, 40.0), corner.y + _RULER)
+        _ruler(ui, player, view, animation, area, corner.y)
+        with imgui_ctx.begin_child("##tracks", imgui.ImVec2(inner, 0), 0, no_nav):
+            if not animation.tracks:
+                _empty(ui)
+            else:
+                (timeline_curves if view.curves else timeline_rows).draw(ui, view, animation, area)
+            _playhead(ui, view, area, corner.y)
+        _playhead(ui, view, area, corner.y)
+        if inspected:
+            imgui.set_cursor_screen_pos(imgui.ImVec2(corner.x + inner + 8, corner.y))
+            with imgui_ctx.begin_child("##inspector", imgui.ImVec2(0, 0), 0, no_nav):
+                timeline_inspector.draw(ui, view, animation)
 
 
 def _button(ui: Ui, action: str, icon: str, about: str, *, on: bool = False, enabled: bool = True) -> None:
-    hint = ui.keys.hint(action)
-    if w.icon_button(icon, f"{about} ({hint})" if hint else about, name=action, on=on, enabled=enabled):
-        ui.act(action)
+    w.act(ui, action, icon, about, on=on, enabled=enabled)
     w.in_row(2)
 
 
 def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, width: float) -> None:
     """The line at the top."""
-    studio = ui.studio
     wide = width >= _ALL_BUTTONS
     if wide:
         _button(ui, "film_first", theme.FIRST, "To the first frame")
@@ -93,17 +74,16 @@ def _buttons(ui: Ui, player: Player, view: TimelineView, animation: Animation, w
         _button(ui, "key_forward", theme.KEY_NEXT, "To the key after")
         _button(ui, "film_last", theme.LAST, "To the last frame")
         _button(ui, "play_repeat", theme.REPEAT, "Repeat while playing", on=player.repeat)
-    frame = studio.frame_number or 0.0
+    frame = ui.studio.frame_number or 0.0
     if width >= _FRAME_BOX:
         _frame_box(ui, player, animation, frame)
     w.in_row(5)
-    imgui.align_text_to_frame_padding()
     text = f"of {animation.count}   {timeline.clock(frame, animation.fps)}"
     if player.playing and ui.speed.frames and width > _ROOM:
         text += f"   {min(ui.speed.frames, animation.fps):.0f} of {animation.fps:g}/s"
     buttons = max(width - 8 - 9 * (imgui.get_frame_height() + 2) - 12, 0.0)
-    shown = clipped(text, buttons - imgui.get_cursor_pos_x() - 6)
-    imgui.text_colored(theme.vec(theme.DIM), shown if shown == text else "")
+    shown = w.clipped(text, buttons - imgui.get_cursor_pos_x() - 6)
+    w.beside(shown if shown == text else "", theme.DIM)
     _right_buttons(ui, player, view, buttons)
 
 
@@ -153,15 +133,12 @@ def _ruler(ui: Ui, player: Player, view: TimelineView, animation: Animation, are
     low, high = imgui.ImVec2(area.left, top), imgui.ImVec2(area.right, top + _RULER - 3)
     draw.add_rect_filled(low, high, theme.packed(theme.HEADER), 4.0)
     draw.push_clip_rect(low, high, True)
-    x = [area.x(view, frame) for frame in (0, animation.count - 1)]
-    draw.add_rect_filled(
-        imgui.ImVec2(x[0], low.y), imgui.ImVec2(x[1], high.y), theme.packed(theme.FRAME), 3.0
-    )
+    spans = [((0, animation.count - 1), theme.packed(theme.FRAME))]
     if player.span is not None:
-        ends = [area.x(view, frame) for frame in player.played(animation)]
-        draw.add_rect_filled(
-            imgui.ImVec2(ends[0], low.y), imgui.ImVec2(ends[1], high.y), theme.packed(theme.ACCENT, 0.28), 3.0
-        )
+        spans.append((player.played(animation), theme.packed(theme.ACCENT, 0.28)))
+    for ends, color in spans:
+        first, last = (area.x(view, frame) for frame in ends)
+        draw.add_rect_filled(imgui.ImVec2(first, low.y), imgui.ImVec2(last, high.y), color, 3.0)
     step = timeline_view.step_of_marks(view.last - view.first, int(area.width / 74))
     with theme.font(size=11.5):
         for frame in timeline_view.marks(view.first, view.last, step):

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from clfractal.scene.animation import Animation, Key
+from clfractal.scene.animation import Animation
 from clfractal.scene.curves import Values
 from clfractal.viewer import timeline_edits as timeline
 from clfractal.viewer import timeline_view
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.timeline_area import Area, box, diamond
-from clfractal.viewer.panels.timeline_inspector import way_menu
+from clfractal.viewer.panels.timeline_inspector import key_menu
 from clfractal.viewer.panels.timeline_rows import ROW, label
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.timeline_view import TimelineView
@@ -89,10 +89,6 @@ def _grid(area: Area, frame: _Frame) -> None:
             draw.add_text(imgui.ImVec2(area.left + 4, y - 12), theme.packed(theme.DIM), text)
 
 
-def _color(component: int, count: int) -> theme.Rgba:
-    return theme.SECOND if count == 1 else theme.AXES[component % 3]
-
-
 def _curves(
     view: TimelineView, area: Area, frame: _Frame, curve: list[tuple[float, Values]], *, fixed: bool
 ) -> None:
@@ -104,7 +100,8 @@ def _curves(
     )
     for component in range(count):
         places = [imgui.ImVec2(area.x(view, at), frame.y(values[component])) for at, values in curve]
-        color = theme.packed(_color(component, count), 0.6 if fixed else 1.0)
+        own = theme.SECOND if count == 1 else theme.AXES[component % 3]
+        color = theme.packed(own, 0.6 if fixed else 1.0)
         draw.add_polyline(places, color, 1.6, 0)
         # The values stay what they are before the first key and after the last.
         for end, rim in ((places[0], area.left), (places[-1], area.right)):
@@ -134,7 +131,7 @@ def _handles(
     key, after = keys[index], keys[index + 1]
     if (key.interpolation or track.interpolation) != "bezier" or key.handles is None:
         return []
-    component = _widest(key, after)
+    component = max(range(len(key.values)), key=lambda n: abs(after.values[n] - key.values[n]))
     begin, end = animation.frame_of(key), animation.frame_of(after)
     first, last = key.values[component], after.values[component]
     if first == last:
@@ -162,10 +159,6 @@ def _handle_values(view: TimelineView, animation: Animation, name: str) -> list[
     return found
 
 
-def _widest(key: Key, after: Key) -> int:
-    return max(range(len(key.values)), key=lambda n: abs(after.values[n] - key.values[n]))
-
-
 def _pointer(
     ui: Ui,
     view: TimelineView,
@@ -179,11 +172,9 @@ def _pointer(
     imgui.set_cursor_screen_pos(imgui.ImVec2(area.left, top))
     imgui.invisible_button("##curves", imgui.ImVec2(area.width, max(frame.bottom + 3 - top, 1)))
     mouse, over, name = imgui.get_mouse_pos(), imgui.is_item_hovered(), view.track
-    near = min(
-        grips, key=lambda grip: (abs(grip.x - mouse.x) + abs(grip.y - mouse.y), -grip.handle), default=None
-    )
-    if near is not None and abs(near.x - mouse.x) + abs(near.y - mouse.y) > _REACH:
-        near = None
+    away = {grip: abs(grip.x - mouse.x) + abs(grip.y - mouse.y) for grip in grips}
+    within_reach = [grip for grip in grips if away[grip] <= _REACH]
+    near = min(within_reach, key=lambda grip: (away[grip], -grip.handle), default=None)
     if imgui.is_item_activated():
         _press(ui, view, near, frame)
     if imgui.is_item_active() and imgui.is_mouse_dragging(0, 2.0):
@@ -196,17 +187,13 @@ def _pointer(
         view.selection -= view.held.get("leaves", timeline.NONE)
         view.held.clear()
         view.end(ui.studio)
-    if over and imgui.is_mouse_clicked(imgui.MouseButton_.right) and near is not None:
-        if (name, near.index) not in view.selection:
-            view.selection = frozenset({(name, near.index)})
-        imgui.open_popup("##key.menu")
-    way_menu(ui, view, "##key.menu")
-    if over:
-        area.wheel(view)
-        fixed = timeline_view.why_fixed(animation, name)
-        if near is None:
-            w.tip(fixed or _HINT)
-    return near if over else None
+    key_menu(ui, view, (name, near.index) if over and near is not None else None)
+    if not over:
+        return None
+    area.wheel(view)
+    if near is None:
+        w.tip(timeline_view.why_fixed(animation, name) or _HINT)
+    return near
 
 
 def _press(ui: Ui, view: TimelineView, near: _Grip | None, frame: _Frame) -> None:
@@ -286,8 +273,7 @@ def _with_handle(old: Animation, place: timeline.KeyAt, grip: _Grip, at: float, 
     share, way = (at - begin) / (end - begin), (value - first) / (last - first)
     handles = list(key.handles or (0.42, 0.0, 0.58, 1.0))
     handles[2 * grip.handle - 2 : 2 * grip.handle] = [share, way]
-    x1, y1, x2, y2 = handles
-    return timeline.with_handles(old, place, (x1, y1, x2, y2))
+    return timeline.with_handles(old, place, handles)
 
 
 def _keys(view: TimelineView, grips: list[_Grip], name: str, over: _Grip | None) -> None:
@@ -301,10 +287,9 @@ def _keys(view: TimelineView, grips: list[_Grip], name: str, over: _Grip | None)
                 and each.component == grip.component
                 and each.index == grip.index + grip.handle - 1
             )
-            draw.add_line(
-                imgui.ImVec2(grip.x, grip.y), imgui.ImVec2(end.x, end.y), theme.packed(theme.ACCENT, 0.7)
-            )
-            draw.add_circle_filled(imgui.ImVec2(grip.x, grip.y), 4.0, theme.packed(theme.ACCENT))
+            place, far = imgui.ImVec2(grip.x, grip.y), imgui.ImVec2(end.x, end.y)
+            draw.add_line(place, far, theme.packed(theme.ACCENT, 0.7))
+            draw.add_circle_filled(place, 4.0, theme.packed(theme.ACCENT))
         else:
             chosen = (name, grip.index) in view.selection
             diamond(grip.x, grip.y, chosen=chosen, hovered=over == grip, size=4.5)

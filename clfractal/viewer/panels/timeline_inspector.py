@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, TypeAlias, get_args
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.scene.animation import EASES, MAX_FRAMES, Animation, Interpolation, Key, Track
 from clfractal.viewer import timeline_edits as timeline
@@ -39,6 +39,12 @@ EDITED = {
 KeyEdit: TypeAlias = Callable[[Animation, KeyAt, float], tuple[Animation, Selection]]
 """Makes of an animation, a key of it and a number another animation, and the keys that are chosen in it."""
 WAYS: tuple[Interpolation, ...] = get_args(Interpolation)
+# Of tracks with keys: a field, its label, and the words of its values.
+_OF_KEYS: tuple[tuple[str, str, dict[Any, str]], ...] = (
+    ("interpolation", "Way", {way: w.word(way) for way in WAYS}),
+    ("repeat", "After the last", {"none": "Its value", "loop": "Loop", "ping_pong": "Ping-pong"}),
+    ("around_target", "Round target", {None: "Where smooth", True: "Yes", False: "No"}),
+)
 _AXES = ("x1", "y1", "x2", "y2")
 _LISTED = 14
 
@@ -60,19 +66,48 @@ def draw(ui: Ui, view: TimelineView, animation: Animation) -> None:
 def _number(
     ui: Ui,
     view: TimelineView,
-    name: str,
+    label: str,
+    path: str,
+    of: tuple[Any, str],
     value: float,
-    width: float,
     scale: Scale,
-    change: Callable[..., Animation],
+    change: Callable[[Animation, float], Animation],
+    name: str = "",
 ) -> None:
-    """A number box of the animation; `change(animation, number)` sets it."""
-    _apply(ui, view, w.number_box(w.boxes(ui), name, value, width, scale), change)
+    """A row with a number of the animation; `change` sets it, and a drag is one step.
+
+    Args:
+        of: the section and its field that it is.
+        name: of its box; else the path.
+    """
+    width = _row(ui, label, path, *of)
+    if width is None:
+        return
+    found = w.number_box(w.boxes(ui), name or path, value, width, scale)
+    _apply(ui, view, found, lambda old, new: (change(old, new), view.selection))
+
+
+def _apply(
+    ui: Ui, view: TimelineView, found: Change, edit: Callable[[Animation, float], tuple[Animation, Selection]]
+) -> None:
+    """Does what a number box returned; a drag is one step."""
+    new = found.value
+    if new is not None and found.dragging:
+        if view.before is None:
+            view.begin(ui.studio)
+        view.drag(ui.studio, lambda old: edit(old, new))
+    elif new is not None:
+        view.edit(ui.studio, lambda old: edit(old, new))
+    if found.ended:
+        view.end(ui.studio)
 
 
 def _row(ui: Ui, label: str, path: str, section: Any, key: str) -> float | None:
-    meta = metadata.metas(section)[key]
-    return w.row(ui, label, path=path, tip=meta.description)
+    return w.row(ui, label, path=path, tip=_about(section, key))
+
+
+def _about(section: Any, key: str) -> str:
+    return metadata.metas(section)[key].description
 
 
 def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
@@ -116,7 +151,7 @@ def _key(ui: Ui, view: TimelineView, animation: Animation, at: KeyAt) -> None:
             if place:
                 w.in_row(3)
             found = w.number_box(w.boxes(ui), f"{path}.handles.{place}", number, wide, Scale(step=0.01))
-            w.tip(f"{_AXES[place]}: {metadata.metas(Key)['handles'].description}")
+            w.tip(f"{_AXES[place]}: {_about(Key, 'handles')}")
             _of_key(ui, view, at, found, _in_place(_handled, place))
 
 
@@ -128,8 +163,7 @@ def _in_place(change: Callable[[Animation, KeyAt, int, float], Animation], numbe
 def _handled(old: Animation, at: KeyAt, place: int, number: float) -> Animation:
     handles = list(timeline.key_of(old, at).handles or EASES["ease"])
     handles[place] = number
-    x1, y1, x2, y2 = handles
-    return timeline.with_handles(old, at, (x1, y1, x2, y2))
+    return timeline.with_handles(old, at, handles)
 
 
 def _dragged(view: TimelineView) -> KeyAt | None:
@@ -140,58 +174,43 @@ def _dragged(view: TimelineView) -> KeyAt | None:
 
 def _of_key(ui: Ui, view: TimelineView, at: KeyAt, found: Change, change: KeyEdit) -> None:
     """Does what a number box of a key returned; a drag is one step, and changes the key that it began with."""
-    new = found.value
-    if new is not None and found.dragging:
-        if view.before is None:
-            view.begin(ui.studio)
-        first = _dragged(view) or at
-        view.drag(ui.studio, lambda old: change(old, first, new))
-    elif new is not None:
-        view.edit(ui.studio, lambda old: change(old, at, new))
-    if found.ended:
-        view.end(ui.studio)
-
-
-def _apply(
-    ui: Ui, view: TimelineView, found: Change, change: Callable[[Animation, float], Animation]
-) -> None:
-    """Does what a number box returned; a drag is one step."""
-    new = found.value
-    if new is not None and found.dragging:
-        if view.before is None:
-            view.begin(ui.studio)
-        view.drag(ui.studio, lambda old: (change(old, new), view.selection))
-    elif new is not None:
-        view.change(ui.studio, lambda old: change(old, new))
-    if found.ended:
-        view.end(ui.studio)
+    _apply(ui, view, found, lambda old, new: change(old, _dragged(view) or at, new))
 
 
 def _ways(ui: Ui, view: TimelineView) -> None:
     """How the chosen keys go on to the next ones."""
     animation = ui.studio.scene.animation
-    width = _row(ui, "To the next", "animation.tracks.keys.interpolation", Key, "interpolation")
-    if width is None or animation is None:
+    if animation is None:
         return
     words = {timeline.key_of(animation, each).interpolation for each in view.selection}
     names: dict[Any, str] = {"": "As the track", **{way: w.word(way) for way in WAYS}}
     now: Any = words.pop() or "" if len(words) == 1 else "mixed"
-    found = w.choose("key.way", {**names, "mixed": "Several"} if now == "mixed" else names, now, width)
+    names |= {"mixed": "Several"} if now == "mixed" else {}
+    path, about = "animation.tracks.keys.interpolation", _about(Key, "interpolation")
+    found = w.pick(ui, "To the next", names, now, path=path, name="key.way", tip=about, listed=True)
     if found is not None and found != "mixed":
         view.change(ui.studio, lambda old: timeline.with_way(old, view.selection, found or None))
 
 
-def way_menu(ui: Ui, view: TimelineView, name: str) -> None:
-    """The menu of the chosen keys: the way to the next key, deleting."""
-    if not imgui.begin_popup(name):
+def key_menu(ui: Ui, view: TimelineView, under: KeyAt | None) -> None:
+    """The menu of the chosen keys: the way to the next key, deleting. A right click on a key opens it.
+
+    Args:
+        under: the key under the pointer; None: none.
+    """
+    if under is not None and imgui.is_mouse_clicked(imgui.MouseButton_.right):
+        if under not in view.selection:
+            view.selection = frozenset({under})
+        view.track = under[0]
+        imgui.open_popup("##key.menu")
+    if not imgui.begin_popup("##key.menu"):
         return
     animation = ui.studio.scene.animation
     chosen = timeline.still_there(animation, view.selection)
     words = {timeline.key_of(animation, each).interpolation for each in chosen} if animation else set()
     for way in (None, *WAYS):
         text = "As the track" if way is None else w.word(way)
-        clicked, _ = imgui.menu_item(text, "", words == {way})
-        if clicked:
+        if imgui.menu_item(text, "", words == {way})[0]:
             view.change(ui.studio, lambda old, way=way: timeline.with_way(old, chosen, way))  # type: ignore[misc]
     imgui.separator()
     if imgui.menu_item("Delete", ui.keys.hint("delete_keys") or "", False)[0]:
@@ -202,45 +221,29 @@ def way_menu(ui: Ui, view: TimelineView, name: str) -> None:
 def _track(ui: Ui, view: TimelineView, animation: Animation, name: str) -> None:
     track, path = animation.tracks[name], f"animation.tracks.{name}"
     w.group(ui, name if len(name) < 27 else f"…{name[-26:]}")
-
-    def put(**changes: Any) -> None:
-        view.change(ui.studio, lambda old: timeline.with_track(old, name, changes))
-
-    if track.keys is not None:
-        width = _row(ui, "Way", path, Track, "interpolation")
-        if width is not None:
-            way = w.choose("track.way", {each: w.word(each) for each in WAYS}, track.interpolation, width)
-            if way is not None:
-                put(interpolation=way)
-        width = _row(ui, "After the last", path, Track, "repeat")
-        if width is not None:
-            words = {"none": "Its value", "loop": "Loop", "ping_pong": "Ping-pong"}
-            after = w.choose("track.repeat", words, track.repeat, width)
-            if after is not None:
-                put(repeat=after)
-        if name.endswith("position"):
-            width = _row(ui, "Round target", path, Track, "around_target")
-            if width is not None:
-                ways = {"null": "Where smooth", "true": "Yes", "false": "No"}
-                now = {None: "null", True: "true", False: "false"}[track.around_target]
-                turns = w.choose("track.around", ways, now, width)
-                if turns is not None:
-                    put(around_target={"null": None, "true": True, "false": False}[turns])
+    for key, label, words in _OF_KEYS if track.keys is not None else ():
+        if key == "around_target" and not name.endswith("position"):
+            continue
+        now, about = words[getattr(track, key)], _about(Track, key)
+        shown = {text: text for text in words.values()}  # (null is no choice, but its word is)
+        found = w.pick(ui, label, shown, now, path=path, name=f"track.{key}", tip=about, listed=True)
+        if found is not None:
+            chosen = {key: next(value for value, text in words.items() if text == found)}
+            view.change(ui.studio, lambda old, chosen=chosen: timeline.with_track(old, name, chosen))  # type: ignore[misc]
     for key in ("expression", "file", "column"):
         _texts(ui, view, name, track, key)
-    if track.file is not None:
-        for key in ("factor", "offset"):
-            width = _row(ui, key.capitalize(), path, Track, key)
-            if width is not None:
-                _number(
-                    ui,
-                    view,
-                    f"{path}.{key}",
-                    getattr(track, key),
-                    width,
-                    Scale(),
-                    lambda old, number, key=key: timeline.with_track(old, name, {key: number}),
-                )
+    for key in ("factor", "offset") if track.file is not None else ():
+        _number(
+            ui,
+            view,
+            key.capitalize(),
+            path,
+            (Track, key),
+            getattr(track, key),
+            Scale(),
+            lambda old, number, key=key: timeline.with_track(old, name, {key: number}),  # type: ignore[misc]
+            f"{path}.{key}",
+        )
     imgui.dummy(imgui.ImVec2(0, 1))
     w.in_labels()
     if w.button("Remove track", icon=theme.TRASH, about="The value stays what the scene as it stands has"):
@@ -273,49 +276,55 @@ def film_popup(ui: Ui, view: TimelineView) -> None:
     assert animation is not None
     w.group(ui, "Film")
     keep = bool(ui.memory.setdefault("timeline.scale", False))
-    width = _row(ui, "Frames", "animation.frames", Animation, "frames")
-    if width is not None:
-        found = w.number_box(
-            w.boxes(ui), "film.frames", animation.count, width, Scale(1, MAX_FRAMES, whole=True, step=0.3)
-        )
-        _apply(ui, view, found, lambda old, new: timeline.with_frames(old, int(new), scale=keep))
-    width = _row(ui, "Duration", "animation.duration", Animation, "duration")
-    if width is not None:
-        seconds = animation.count / animation.fps
-        found = w.number_box(
-            w.boxes(ui), "film.seconds", seconds, width, Scale(0.001, 1e6, unit=" s", step=0.02)
-        )
-        _apply(ui, view, found, lambda old, new: timeline.with_frames(old, round(new * old.fps), scale=keep))
-    width = _row(ui, "Frames a second", "animation.fps", Animation, "fps")
-    if width is not None:
-        found = w.number_box(w.boxes(ui), "film.fps", animation.fps, width, Scale(0.01, 1000, step=0.2))
-        _apply(
-            ui, view, found, lambda old, new: timeline.with_rate(old, new, "seconds" if keep else "frames")
-        )
-    width = w.row(
-        ui,
-        "Keys move along",
-        tip="of another length: keys keep their part of the film; at another rate: their seconds. Else: their frames",
+
+    def number(label: str, key: str, value: float, scale: Scale, change: Any) -> None:
+        _number(ui, view, label, f"animation.{key}", (Animation, key), value, scale, change)
+
+    def put(**changes: Any) -> None:
+        view.change(ui.studio, lambda old: old.model_copy(update=changes))
+
+    number(
+        "Frames",
+        "frames",
+        animation.count,
+        Scale(1, MAX_FRAMES, whole=True, step=0.3),
+        lambda old, new: timeline.with_frames(old, int(new), scale=keep),
     )
-    if width is not None and w.toggle("film.scale", keep):
+    number(
+        "Duration",
+        "duration",
+        animation.count / animation.fps,
+        Scale(0.001, 1e6, unit=" s", step=0.02),
+        lambda old, new: timeline.with_frames(old, round(new * old.fps), scale=keep),
+    )
+    number(
+        "Frames a second",
+        "fps",
+        animation.fps,
+        Scale(0.01, 1000, step=0.2),
+        lambda old, new: timeline.with_rate(old, new, "seconds" if keep else "frames"),
+    )
+    about = "of another length: keys keep their part of the film; at another rate: their seconds. Else: their frames"
+    if w.switch(ui, "Keys move along", keep, path="", name="film.scale", tip=about):
         ui.memory["timeline.scale"] = not keep
-    width = _row(ui, "Loop", "animation.loop", Animation, "loop")
-    if width is not None and w.toggle("film.loop", animation.loop):
-        view.change(ui.studio, lambda old: old.model_copy(update={"loop": not old.loop}))
-    width = _row(ui, "Noise", "animation.noise", Animation, "noise")
-    if width is not None:
-        noise = w.segments("film.noise", {"new": "New", "fixed": "Fixed"}, animation.noise, width)
-        if noise is not None:
-            view.change(ui.studio, lambda old: old.model_copy(update={"noise": noise}))
-    width = _row(ui, "Shutter", "animation.shutter", Animation, "shutter")
-    if width is not None:
-        found = w.number_box(w.boxes(ui), "film.shutter", animation.shutter, width, Scale(0, 1, step=0.01))
-        _apply(ui, view, found, lambda old, new: old.model_copy(update={"shutter": new}))
-    width = _row(ui, "Frame of stills", "animation.frame", Animation, "frame")
-    place = ui.studio.place
-    if width is not None and w.toggle("film.still", animation.frame is not None):
-        still = place.frame if animation.frame is None and place is not None else None
-        view.change(ui.studio, lambda old: old.model_copy(update={"frame": still}))
+    path = "animation.loop"
+    if w.switch(ui, "Loop", animation.loop, path=path, name="film.loop", tip=_about(Animation, "loop")):
+        put(loop=not animation.loop)
+    noises, about = {"new": "New", "fixed": "Fixed"}, _about(Animation, "noise")
+    noise = w.pick(ui, "Noise", noises, animation.noise, path="animation.noise", tip=about)
+    if noise is not None:
+        put(noise=noise)
+    number(
+        "Shutter",
+        "shutter",
+        animation.shutter,
+        Scale(0, 1, step=0.01),
+        lambda old, new: old.model_copy(update={"shutter": new}),
+    )
+    about, on = _about(Animation, "frame"), animation.frame is not None
+    if w.switch(ui, "Frame of stills", on, path="animation.frame", name="film.still", tip=about):
+        place = ui.studio.place
+        put(frame=place.frame if not on and place is not None else None)
     imgui.dummy(imgui.ImVec2(0, 1))
     w.in_labels()
     if w.button("Remove the film", icon=theme.TRASH, about="The scene as it stands is kept"):
@@ -332,31 +341,23 @@ def add_popup(ui: Ui, view: TimelineView) -> None:
     animation, scene = ui.studio.scene.animation, ui.studio.scene
     assert animation is not None
     wanted = w.search(ui, "timeline.search", "Find a value").strip().lower().split()
-    known = ui.memory.get("timeline.movable")
-    if known is None or known[0] is not scene:
-        known = ui.memory["timeline.movable"] = (scene, [".".join(path) for path in movable(scene)])
-    free = [
-        name
-        for name in known[1]
-        if not any(
-            name == each or name.startswith(f"{each}.") or each.startswith(f"{name}.")
-            for each in animation.tracks
-        )
-    ]
+    names = ui.kept_for("timeline.movable", scene, lambda: [".".join(path) for path in movable(scene)])
+    taken = [f"{each}." for each in animation.tracks]
+    free = [name for name in names if not any(f"{name}.".startswith(each) for each in taken)]
+    free = [name for name in free if not any(each.startswith(f"{name}.") for each in taken)]
     found = [
         name
         for name in free
         if all(word in name.lower().replace("_", " ") or word in name for word in wanted)
     ]
     now = ui.studio.frame_number or 0.0
-    imgui.begin_child("##values", imgui.ImVec2(0, 20.0 * min(max(len(found), 1), _LISTED)))
-    for name in found:
-        if imgui.selectable(name, False)[0]:
-            value = value_of(scene, tuple(name.split(".")))
-            view.change(ui.studio, lambda old, n=name, v=value: timeline.with_key(old, n, now, v))  # type: ignore[misc]
-            view.track = name
-            imgui.close_current_popup()
-    if not found:
-        w.hint(ui, "Nothing of this name can move.")
-    imgui.end_child()
+    with imgui_ctx.begin_child("##values", imgui.ImVec2(0, 20.0 * min(max(len(found), 1), _LISTED))):
+        for name in found:
+            if imgui.selectable(name, False)[0]:
+                value = value_of(scene, tuple(name.split(".")))
+                view.change(ui.studio, lambda old, n=name, v=value: timeline.with_key(old, n, now, v))  # type: ignore[misc]
+                view.track = name
+                imgui.close_current_popup()
+        if not found:
+            w.hint(ui, "Nothing of this name can move.")
     imgui.end_popup()

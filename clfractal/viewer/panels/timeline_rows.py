@@ -10,9 +10,8 @@ from clfractal.viewer import timeline_view
 from clfractal.viewer.film_place import value_of
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
-from clfractal.viewer.panels.buttons import clipped
 from clfractal.viewer.panels.timeline_area import LEFT, Area, box, diamond
-from clfractal.viewer.panels.timeline_inspector import way_menu
+from clfractal.viewer.panels.timeline_inspector import key_menu
 from clfractal.viewer.panels.ui import Ui
 from clfractal.viewer.timeline_edits import KeyAt
 from clfractal.viewer.timeline_view import TimelineView
@@ -21,6 +20,7 @@ ROW = 22.0
 """Points that a row is high."""
 _REACH = 7.0
 _LEAST_FACTOR = 0.02
+_HINT = "Drag keys; Alt and drag stretches them about the frame that is shown; double click adds one"
 
 
 def draw(ui: Ui, view: TimelineView, animation: Animation, area: Area) -> None:
@@ -55,7 +55,7 @@ def label(view: TimelineView, animation: Animation, name: str, left: float, top:
         )
     fixed = timeline_view.why_fixed(animation, name)
     color = theme.ACCENT if on else theme.TEXT if over else theme.DIM
-    shown = clipped(short(name), LEFT - 34 if fixed else LEFT - 16)
+    shown = w.clipped(short(name), LEFT - 34 if fixed else LEFT - 16)
     draw.add_text(imgui.ImVec2(left + 6, top + 3), theme.packed(color), shown)
     if fixed:
         icon = theme.CODE if animation.tracks[name].expression is not None else theme.LIST
@@ -114,20 +114,11 @@ def _pointer(
     if imgui.is_item_deactivated():
         view.held.clear()
         view.end(ui.studio)
-    if over and imgui.is_mouse_clicked(imgui.MouseButton_.right) and found is not None:
-        if found not in view.selection:
-            view.selection = frozenset({found})
-        view.track = found[0]
-        imgui.open_popup("##key.menu")
-    way_menu(ui, view, "##key.menu")
+    key_menu(ui, view, found if over else None)
     if over and (io.key_ctrl or io.mouse_wheel_h):
         area.wheel(view)
     if over and found is None and name:
-        fixed = timeline_view.why_fixed(animation, name)
-        w.tip(
-            fixed
-            or "Drag keys; Alt and drag stretches them about the frame that is shown; double click adds one"
-        )
+        w.tip(timeline_view.why_fixed(animation, name) or _HINT)
     return found if over else None
 
 
@@ -143,8 +134,8 @@ def _press(
     more = imgui.get_io().key_shift
     view.held.clear()
     if found is None:
-        view.held["box"] = (*place, view.selection if more else timeline.NONE)
         view.selection = view.selection if more else timeline.NONE
+        view.held["box"] = (*place, view.selection)
         view.track = name or view.track
         return
     if more:
@@ -164,8 +155,10 @@ def _drag(ui: Ui, view: TimelineView, animation: Animation, area: Area, names: l
     if "box" in view.held:
         x, y, before = view.held["box"]
         first, last = sorted((area.frame(view, x), frame))
-        rows = [number for number in range(len(names)) if _within(top + ROW * (number + 0.5), y, mouse.y)]
-        view.selection = before | timeline.keys_between(animation, first, last, [names[row] for row in rows])
+        low, high = sorted((y - top, mouse.y - top))
+        # A box that is thinner than a row chooses in the row that it is in.
+        rows = [name for row, name in enumerate(names) if low <= ROW * (row + 1) and ROW * row <= high]
+        view.selection = before | timeline.keys_between(animation, first, last, rows)
     elif view.before is not None:
         selection, start = view.before[1], view.held["from"]
         pivot = ui.studio.frame_number or 0.0
@@ -175,11 +168,6 @@ def _drag(ui: Ui, view: TimelineView, animation: Animation, area: Area, names: l
         else:
             step = round(frame - start) if whole else frame - start
             view.drag(ui.studio, lambda old: timeline.shifted(old, selection, step, whole=whole))
-
-
-def _within(y: float, first: float, second: float) -> bool:
-    # A box that is thinner than a row chooses in the row that it is in.
-    return min(first, second) - ROW / 2 <= y <= max(first, second) + ROW / 2
 
 
 def _add(ui: Ui, view: TimelineView, animation: Animation, name: str, frame: float) -> None:

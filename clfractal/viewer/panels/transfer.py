@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 from imgui_bundle import imgui
 
-from clfractal.files.srgb import encode
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
@@ -19,13 +20,11 @@ from clfractal.viewer.histogram import Histogram, HistogramTask, histogram_of
 from clfractal.viewer.panels import theme, volume
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.color_button import shown
-from clfractal.viewer.panels.metadata import plain
+from clfractal.viewer.panels.stops import SEGMENTS, Stops, color_at, dragged, draw_strip, state_of, without
 from clfractal.viewer.panels.ui import Ui
 
-Stops = list[dict[str, Any]]
 _HEIGHT, _STRIP, _REACH = 120.0, 16.0, 9.0
 _FAR = 60.0
-_SEGMENTS = 64
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,25 +44,19 @@ class Values:
     histogram: Callable[[], Histogram | None]
     problem: Callable[[], str] = str
 
-    @property
-    def opacity(self) -> str:
-        """The path of the stops."""
-        return f"{self.section}.transfer.opacity"
+    def path(self, name: str) -> str:
+        """The path of the stops of `opacity`, `color` or `emission`."""
+        return f"{self.section}.transfer.{name}"
 
-    @property
-    def color(self) -> str:
-        """The path of the stops."""
-        return f"{self.section}.transfer.color"
+    def switched_off(self, ui: Ui) -> dict[str, Any]:
+        """The stops that come back when they are switched on again, by those names."""
+        return ui.kept(f"transfer.kept {self.section}", dict[str, Any])
 
-    @property
-    def emission(self) -> str:
-        """The path of the stops."""
-        return f"{self.section}.transfer.emission"
-
-    def state(self, ui: Ui, name: str, **first: Any) -> dict[str, Any]:
-        """What is remembered of the panel from frame to frame."""
-        found: dict[str, Any] = ui.memory.setdefault(f"transfer.{name} {self.section}", first)
-        return found
+    def switch(self, ui: Ui, name: str, label: str, tip: str) -> tuple[Stops | None, bool]:
+        """The switch of some stops: what is there, and whether it was clicked."""
+        path, stops = self.path(name), w.plain(w.value(ui, self.path(name)))
+        on = stops is not None
+        return stops, w.switch(ui, label, on, path=path, tip=tip, differs=on)
 
 
 def summary(ui: Ui) -> str:
@@ -84,69 +77,61 @@ def draw(ui: Ui) -> None:
 
 def of_values(ui: Ui, of: Values, words: tuple[str, str] = ("Surface", "All values")) -> None:
     """Draws what values show: the words are those for a surface at one of them, and for all by their opacity."""
-    low, high = of.low, of.high
-    opacity, color = plain(w.value(ui, of.opacity)), plain(w.value(ui, of.color))
-    width = w.row(ui, "Show", path=of.opacity, tip="a surface at one value, or all values by their opacity")
-    if width is not None:
-        found = w.segments(of.opacity, {False: words[0], True: words[1]}, opacity is not None, width)
-        if found is not None:
-            _switch_opacity(ui, of, found)
-            return
-    w.problem(ui, of.opacity)
-    if opacity is not None and w.found(ui, "Opacity of values", of.opacity):
-        _graph(ui, of, opacity, color)
-    about = "colours by value; else the material's colour"
+    path = of.path("opacity")
+    opacity, ways = w.plain(w.value(ui, path)), {False: words[0], True: words[1]}
+    about = "a surface at one value, or all values by their opacity"
+    found = w.pick(ui, "Show", ways, opacity is not None, path=path, tip=about)
+    if found is not None:
+        _switch_opacity(ui, of, found)
+        return
+    if opacity is not None and w.found(ui, "Opacity of values", path):
+        _graph(ui, of, opacity, w.plain(w.value(ui, of.path("color"))))
     if opacity is not None or of.section == "renderer":
-        width = w.row(ui, "Own colours", path=of.color, tip=about, differs=color is not None)
-        if width is not None and w.toggle(of.color, color is not None):
+        about = "colours by value; else the material's colour"
+        color, clicked = of.switch(ui, "color", "Own colours", about)
+        if clicked:
             _switch_color(ui, of, color is None)
             return
-        w.problem(ui, of.color)
-        if color is not None and w.found(ui, "Colours of values", of.color):
-            _strip(ui, of.color, color, low, high)
+        _strip_of(ui, of, "color", "Colours of values", color)
     if opacity is not None:
         _light(ui, of)
 
 
+def _strip_of(ui: Ui, of: Values, name: str, label: str, stops: Stops | None) -> None:
+    """What is wrong with stops, and their editor if there are any."""
+    w.problem(ui, of.path(name))
+    if stops is not None and w.found(ui, label, of.path(name)):
+        _strip(ui, of.path(name), stops, of.low, of.high)
+
+
 def _light(ui: Ui, of: Values) -> None:
     """Whether values shine by themselves, which of them, and how brightly."""
-    low, high = of.low, of.high
-    found = plain(w.value(ui, of.emission))
-    tip = "light of their own, by value"
-    width = w.row(ui, "Shines", path=of.emission, tip=tip, differs=found is not None)
-    if width is not None and w.toggle(of.emission, found is not None):
-        kept = of.state(ui, "kept")
-        if found is not None:
-            kept["emission"] = found
-            ui.studio.edit({of.emission: None})
-            return
-        first = [
-            {"at": (low + high) / 2, "emission": [0.0, 0.0, 0.0]},
-            {"at": high, "emission": [0.05, 0.015, 0.002]},
-        ]
-        ui.studio.edit({of.emission: kept.get("emission") or first})
+    found, clicked = of.switch(ui, "emission", "Shines", "light of their own, by value")
+    if not clicked:
+        _strip_of(ui, of, "emission", "Light of values", found)
         return
-    w.problem(ui, of.emission)
-    if found is not None and w.found(ui, "Light of values", of.emission):
-        _strip(ui, of.emission, found, low, high)
+    first = [
+        {"at": (of.low + of.high) / 2, "emission": [0.0, 0.0, 0.0]},
+        {"at": of.high, "emission": [0.05, 0.015, 0.002]},
+    ]
+    _switch(ui, of, "emission", found is None, first)
 
 
 def _switch_opacity(ui: Ui, of: Values, on: bool) -> None:
-    low, span, kept = of.low, of.high - of.low, of.state(ui, "kept")
+    low, span, kept = of.low, of.high - of.low, of.switched_off(ui)
     is_object = of.section != "renderer"
     if not on:
-        kept["opacity"] = plain(w.value(ui, of.opacity))
-        kept["emission"] = plain(w.value(ui, of.emission)) or kept.get("emission")
-        if is_object:  # whose surface has its material's colour
-            kept["color"] = plain(w.value(ui, of.color)) or kept.get("color")
-        ui.studio.edit({of.opacity: None, of.emission: None, **({of.color: None} if is_object else {})})
+        # An object's surface has its material's colour.
+        names = ("opacity", "emission", *(("color",) if is_object else ()))
+        kept |= {name: w.plain(w.value(ui, of.path(name))) or kept.get(name) for name in names}
+        ui.studio.edit({of.path(name): None for name in names})
         return
     first = [
         {"at": low, "opacity": 0.0},
         {"at": low + 0.25 * span, "opacity": 0.0},
         {"at": of.high, "opacity": 0.6},
     ]
-    changes = {of.opacity: kept.get("opacity") or first, f"{of.section}.level": None}
+    changes = {of.path("opacity"): kept.get("opacity") or first, f"{of.section}.level": None}
     if is_object:  # which has no material of its own then, and needs light along paths
         changes[f"{of.section}.material"] = None
         if ui.studio.scene.lighting.mode != "path":
@@ -155,15 +140,21 @@ def _switch_opacity(ui: Ui, of: Values, on: bool) -> None:
 
 
 def _switch_color(ui: Ui, of: Values, on: bool) -> None:
-    low, high, kept = of.low, of.high, of.state(ui, "kept")
-    if not on:
-        kept["color"] = plain(w.value(ui, of.color))
+    low, high = of.low, of.high
     first = [
         {"at": low, "color": [0.05, 0.1, 0.35]},
         {"at": (low + high) / 2, "color": [0.85, 0.3, 0.06]},
         {"at": high, "color": [1.0, 0.9, 0.6]},
     ]
-    ui.studio.edit({of.color: (kept.get("color") or first) if on else None})
+    _switch(ui, of, "color", on, first)
+
+
+def _switch(ui: Ui, of: Values, name: str, on: bool, first: Stops) -> None:
+    """Switches stops on, to those that were switched off, or the first ones; or off."""
+    kept = of.switched_off(ui)
+    if not on:
+        kept[name] = w.plain(w.value(ui, of.path(name)))
+    ui.studio.edit({of.path(name): (kept.get(name) or first) if on else None})
 
 
 # Opacity
@@ -172,24 +163,36 @@ def _switch_color(ui: Ui, of: Values, on: bool) -> None:
 def _graph(ui: Ui, of: Values, stops: Stops, colors: Stops | None) -> None:
     """The graph of opacity over the histogram; its points are dragged, added and removed."""
     low, high = _range(stops, of.low, of.high)
-    state = of.state(ui, "graph", chosen=0, held=False)
-    state["chosen"] = min(state["chosen"], len(stops) - 1)
-    indent = 11.0
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + indent)
+    path, state = of.path("opacity"), state_of(ui, f"transfer.graph {of.section}", stops)
+    w.in_labels()
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     imgui.invisible_button("##graph", imgui.ImVec2(wide, _HEIGHT))
     area = _Area(corner.x + 6, corner.y + 6, wide - 12, _HEIGHT - 12, low, high)
-    stops = _graph_events(ui, of.opacity, stops, area, state)
+    mouse = imgui.get_mouse_pos()
+    places = [area.place(stop["at"], stop["opacity"]) for stop in stops]
+    distances = [math.dist((each.x, each.y), (mouse.x, mouse.y)) for each in places]
+    near = min(range(len(stops)), key=distances.__getitem__)
+    at, opacity = area.value(mouse.x), area.opacity(mouse.y)
+    stops = dragged(
+        ui,
+        path,
+        stops,
+        state,
+        near=near if distances[near] <= _REACH else None,
+        add=lambda: inserted(stops, at, opacity=opacity),
+        move=lambda: (placed(stops, state["chosen"], at, opacity=opacity), state["chosen"]),
+        off=not -_FAR < mouse.y - area.y < area.height + _FAR and len(stops) > 1,
+    )
     _draw_graph(of, area, stops, colors, state["chosen"])
     if imgui.is_item_hovered() and not imgui.is_item_active():
         w.tip("Drag a point; double click adds one; drag it far off to remove it")
     one = stops[state["chosen"]]
-    _place_row(ui, stops, state, area, of.opacity)
-    path = f"{of.opacity}.{state['chosen']}.opacity"
-    width = w.row(ui, "Opacity", path=path, tip="over a voxel's side")
+    _place_row(ui, stops, state, area, path)
+    place = f"{path}.{state['chosen']}.opacity"
+    width = w.row(ui, "Opacity", path=place, tip="over a voxel's side")
     if width is not None:
-        change = w.number_box(w.boxes(ui), of.opacity, one["opacity"], width, w.Scale(0, 1, (0, 1)))
-        w.apply(ui, path, change)
+        change = w.number_box(w.boxes(ui), path, one["opacity"], width, w.Scale(0, 1, (0, 1)))
+        w.apply(ui, place, change)
 
 
 class _Area:
@@ -224,31 +227,6 @@ def inserted(stops: Stops, at: float, **values: Any) -> tuple[Stops, int]:
     return [*stops[:index], {"at": at, **values}, *stops[index:]], index
 
 
-def _graph_events(ui: Ui, path: str, stops: Stops, area: _Area, state: dict[str, Any]) -> Stops:
-    mouse = imgui.get_mouse_pos()
-    places = [area.place(stop["at"], stop["opacity"]) for stop in stops]
-    if imgui.is_item_activated():
-        distances = [(each.x - mouse.x) ** 2 + (each.y - mouse.y) ** 2 for each in places]
-        near = min(range(len(stops)), key=distances.__getitem__)
-        if distances[near] <= _REACH**2:
-            state.update(chosen=near, held=True)
-        elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
-            stops, state["chosen"] = inserted(stops, area.value(mouse.x), opacity=area.opacity(mouse.y))
-            ui.studio.edit({path: stops})
-    held, far = state["held"], not -_FAR < mouse.y - area.y < area.height + _FAR
-    if imgui.is_item_active() and held and imgui.is_mouse_dragging(0, 2.0):
-        stops = placed(stops, state["chosen"], area.value(mouse.x), opacity=area.opacity(mouse.y))
-        ui.studio.edit({path: stops}, gesture=path)
-    if imgui.is_item_deactivated() and held:
-        state["held"] = False
-        if far and len(stops) > 1:
-            stops = _without(stops, state["chosen"])
-            ui.studio.edit({path: stops}, gesture=path)
-            state["chosen"] = max(state["chosen"] - 1, 0)
-        ui.studio.end_gesture()
-    return stops
-
-
 def _draw_graph(of: Values, area: _Area, stops: Stops, colors: Stops | None, chosen: int) -> None:
     draw = imgui.get_window_draw_list()
     low = imgui.ImVec2(area.x - 6, area.y - 6)
@@ -270,7 +248,7 @@ def _draw_graph(of: Values, area: _Area, stops: Stops, colors: Stops | None, cho
         middle = area.place(stop["at"], stop["opacity"])
         fill = theme.packed(theme.ACCENT if number == chosen else theme.PANEL_SOLID)
         if colors is not None:
-            codes, _ = shown(_color_at(colors, stop["at"]))
+            codes, _ = shown(color_at(colors, stop["at"]))
             fill = theme.packed((*codes, 1.0))
         draw.add_circle_filled(middle, 5.0, fill)
         edge = theme.TEXT if number == chosen else theme.ACCENT
@@ -325,11 +303,8 @@ def histogram(ui: Ui) -> Histogram | None:
 
 def of_grid(ui: Ui, grid: GivenGrid, section: str) -> Histogram:
     """How often the values of a grid from a file occur; they are counted once."""
-    known = ui.memory.get(f"histogram {section}")
-    if known is None or known[0] is not grid:
-        known = ui.memory[f"histogram {section}"] = (grid, histogram_of(grid.values, grid.low, grid.high))
-    found: Histogram = known[1]
-    return found
+    count = partial(histogram_of, grid.values, grid.low, grid.high)
+    return ui.kept_for(f"histogram {section}", grid, count)
 
 
 # Colours
@@ -339,27 +314,23 @@ def _strip(ui: Ui, path: str, stops: Stops, low: float, high: float) -> None:
     """The colours of values, or the light that they send out, and their stops."""
     key = path.rpartition(".")[2]
     low, high = _range(stops, low, high)
-    state = ui.memory.setdefault(f"transfer.strip.{path}", {"chosen": 0, "held": False})
-    state["chosen"] = min(state["chosen"], len(stops) - 1)
-    imgui.set_cursor_pos_x(imgui.get_cursor_pos_x() + 11)
+    state = state_of(ui, f"transfer.strip.{path}", stops)
+    w.in_labels()
     corner, wide = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     imgui.invisible_button(f"##{key}", imgui.ImVec2(wide, _STRIP + 14))
     area = _Area(corner.x + 6, corner.y, wide - 12, _STRIP, low, high)
     mouse = imgui.get_mouse_pos()
-    if imgui.is_item_activated():
-        near = min(range(len(stops)), key=lambda n: abs(area.place(stops[n]["at"], 0).x - mouse.x))
-        if abs(area.place(stops[near]["at"], 0).x - mouse.x) <= _REACH:
-            state.update(chosen=near, held=True)
-        elif imgui.is_mouse_double_clicked(0) and len(stops) < 256:
-            at = area.value(mouse.x)
-            stops, state["chosen"] = inserted(stops, at, **{key: _color_at(stops, at, key)})
-            ui.studio.edit({path: stops})
-    if imgui.is_item_active() and state["held"] and imgui.is_mouse_dragging(0, 2.0):
-        stops = placed(stops, state["chosen"], area.value(mouse.x))
-        ui.studio.edit({path: stops}, gesture=path)
-    if imgui.is_item_deactivated() and state["held"]:
-        state["held"] = False
-        ui.studio.end_gesture()
+    distances = [abs(area.place(stop["at"], 0).x - mouse.x) for stop in stops]
+    near, at = min(range(len(stops)), key=distances.__getitem__), area.value(mouse.x)
+    stops = dragged(
+        ui,
+        path,
+        stops,
+        state,
+        near=near if distances[near] <= _REACH else None,
+        add=lambda: inserted(stops, at, **{key: color_at(stops, at, key)}),
+        move=lambda: (placed(stops, state["chosen"], at), state["chosen"]),
+    )
     _draw_strip(area, stops, state["chosen"], key)
     w.field(ui, f"{path}.{state['chosen']}.{key}")
     _place_row(ui, stops, state, area, path)
@@ -368,22 +339,11 @@ def _strip(ui: Ui, path: str, stops: Stops, low: float, high: float) -> None:
 def _draw_strip(area: _Area, stops: Stops, chosen: int, key: str) -> None:
     """Light is shown by its parts of the brightest: its amount says what a voxel's side adds."""
     draw = imgui.get_window_draw_list()
-    values = np.linspace(area.low, area.high, _SEGMENTS + 1)
-    colors = np.array([_color_at(stops, float(each), key) for each in values])
+    values = np.linspace(area.low, area.high, SEGMENTS + 1)
+    colors = np.array([color_at(stops, float(each), key) for each in values])
     if key == "emission":
         colors = colors / max(colors.max(), 1e-12)
-    codes = [theme.packed((*map(float, row), 1.0)) for row in encode(np.clip(colors, 0, 1))]
-    for number in range(_SEGMENTS):
-        left = area.x + area.width * number / _SEGMENTS
-        right = area.x + area.width * (number + 1) / _SEGMENTS + 0.5
-        draw.add_rect_filled_multi_color(
-            imgui.ImVec2(left, area.y),
-            imgui.ImVec2(right, area.y + _STRIP),
-            codes[number],
-            codes[number + 1],
-            codes[number + 1],
-            codes[number],
-        )
+    draw_strip((area.x, area.y), area.width, _STRIP, colors)
     for number, stop in enumerate(stops):
         x = area.place(stop["at"], 0).x
         own, _ = shown(stop[key])
@@ -405,7 +365,7 @@ def _place_row(ui: Ui, stops: Stops, state: dict[str, Any], area: _Area, path: s
     w.apply(ui, path, change, lambda new: placed(stops, chosen, new))
     w.in_row(4)
     if w.icon_button(theme.TRASH, "Remove this stop", name=f"{path}.remove", enabled=len(stops) > 1):
-        ui.studio.edit({path: _without(stops, chosen)})
+        ui.studio.edit({path: without(stops, chosen)})
 
 
 def _range(stops: Stops, low: float, high: float) -> tuple[float, float]:
@@ -413,12 +373,3 @@ def _range(stops: Stops, low: float, high: float) -> tuple[float, float]:
     at = [stop["at"] for stop in stops]
     low, high = min(low, *at), max(high, *at)
     return (low, high) if high > low else (low - 0.5, high + 0.5)
-
-
-def _color_at(stops: Stops, value: float, key: str = "color") -> list[float]:
-    at = [stop["at"] for stop in stops]
-    return [float(f"{np.interp(value, at, [s[key][axis] for s in stops]):.4g}") for axis in range(3)]
-
-
-def _without(stops: Stops, index: int) -> Stops:
-    return [stop for number, stop in enumerate(stops) if number != index]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
@@ -16,6 +16,8 @@ from clfractal.viewer.panels import theme
 from clfractal.viewer.picking import Pick
 from clfractal.viewer.settings import Settings
 from clfractal.viewer.studio import Studio
+
+T = TypeVar("T")
 
 _PICTURE = 200.0
 """Points of the picture's width that are left beside the dock, or else it is put away."""
@@ -74,6 +76,24 @@ class Ui:
     comfort: Comfort | None = None
     show: set[str] = field(default_factory=lambda: {"panels", "overlay"})
     memory: dict[str, Any] = field(default_factory=dict)
+
+    def with_key(self, about: str, action: str) -> str:
+        """A tooltip with the key of an action behind it, if that has one."""
+        hint = self.keys.hint(action)
+        return f"{about} ({hint})" if hint else about
+
+    def kept(self, key: str, make: Callable[[], T]) -> T:
+        """What `memory` has under a key, made when it is asked for first."""
+        if key not in self.memory:
+            self.memory[key] = make()
+        return cast(T, self.memory[key])
+
+    def kept_for(self, key: str, of: Any, make: Callable[[], T]) -> T:
+        """The same of what is made of something, and anew of another thing; several things are given as a tuple."""
+        known = self.memory.get(key)
+        if known is None or (known[0] != of if isinstance(of, tuple) else known[0] is not of):
+            known = self.memory[key] = (of, make())
+        return cast(T, known[1])
 
     @property
     def narrow(self) -> bool:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from itertools import islice
 from typing import Any
 
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.engine.variations import (
     KINDS,
@@ -26,6 +26,7 @@ from clfractal.scene.model import Scene
 from clfractal.viewer.panels import cards, layout, right_dock, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.preparing import internal_error
 
 COUNT = 12
 SPARES = 6
@@ -57,7 +58,8 @@ class Draw:
     def __init__(
         self, base: Scene, strength: Strength, seed: int, kinds: frozenset[Kind], woken: Callable[[], None]
     ) -> None:
-        self.base, self.strength, self.seed, self.kinds, self.woken = base, strength, seed, kinds, woken
+        self.kinds, self.woken = kinds, woken
+        self._drawn = candidates(base, strength=strength, seed=seed, kinds=kinds)
         self.found: list[tuple[Variation, Scene]] = []
         self.problem = ""
         self.finished = self.stopped = False
@@ -70,8 +72,7 @@ class Draw:
 
     def _work(self) -> None:
         try:
-            drawn = candidates(self.base, strength=self.strength, seed=self.seed, kinds=self.kinds)
-            for each in islice(drawn, COUNT + SPARES):
+            for each in islice(self._drawn, COUNT + SPARES):
                 if self.stopped:
                     return
                 self.found.append((each, small_scene(each.scene, *SIZE)))
@@ -81,7 +82,7 @@ class Draw:
         except ClfractalError as error:
             self.problem = error.message
         except Exception as error:  # a panel shows it
-            self.problem = f"internal error, please report it: {type(error).__name__}: {error}"
+            self.problem = internal_error(error).message
         self.finished = True
         self.woken()
 
@@ -172,19 +173,17 @@ def _settings(ui: Ui, state: Choice) -> None:
     wide = imgui.get_content_region_avail().x
     words = {each: each.capitalize() for each in STRENGTHS}
     found = w.segments("variations.strength", words, state.strength, wide)
-    if found is not None:
-        state.strength = found
-        begin(ui, state, state.base, state.seed)
+    strength, kinds = found or state.strength, state.kinds
     each_width = (wide - 2 * 4) / len(KINDS)
     for place, kind in enumerate(KINDS):
         if place:
             w.in_row(4)
         on = kind in state.kinds
         if _chip(_KIND_WORDS[kind], on, each_width, f"Vary {_KIND_TIPS[kind]}"):
-            wanted = state.kinds ^ {kind}
-            if wanted:
-                state.kinds = frozenset(wanted)
-                begin(ui, state, state.base, state.seed)
+            kinds = state.kinds ^ {kind} or kinds
+    if (strength, kinds) != (state.strength, state.kinds):
+        state.strength, state.kinds = strength, kinds
+        begin(ui, state, state.base, state.seed)
     imgui.dummy(imgui.ImVec2(0, 1))
 
 
@@ -227,13 +226,11 @@ def _grid(ui: Ui, state: Choice) -> None:
 
 def layout_of(width: float, height: float) -> tuple[int, float]:
     """How many columns of cards a part of the panel has, and how wide they are: as large as they all fit, points."""
-    found = []
-    for columns in range(1, COUNT + 1):
-        rows = -(-COUNT // columns)
-        across = (width - _GAP * (columns - 1)) / columns
-        down = (height - _GAP * (rows - 1)) / rows * 16 / 9
-        found.append((min(across, down), columns))
-    most, columns = max(found)
+    counts = [(-(-COUNT // columns), columns) for columns in range(1, COUNT + 1)]
+    most, columns = max(
+        (min((width + _GAP) / columns - _GAP, ((height + _GAP) / rows - _GAP) * 16 / 9), columns)
+        for rows, columns in counts
+    )
     # In a part that is too small they scroll.
     return (columns, most) if most >= _LEAST else cards.grid(width, _LEAST, _GAP)
 
@@ -248,11 +245,10 @@ def _card(ui: Ui, state: Choice, work: Draw, number: int, width: float) -> None:
             ui.memory["awaited"] = True
         picture.framebuffer = None
     card = cards.Card(key, picture.pixels, picture.problem, chosen=_number_of(ui, state) == number)
-    imgui.push_id(f"{state.number}")
-    clicked = cards.draw(ui, f"{number}", card, width)
-    again = imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0)
-    w.tip(picture.problem or f"{variation.remark}\nDouble click: vary this one")
-    imgui.pop_id()
+    with imgui_ctx.push_id(f"{state.number}"):
+        clicked = cards.draw(ui, f"{number}", card, width)
+        again = imgui.is_item_hovered() and imgui.is_mouse_double_clicked(0)
+        w.tip(picture.problem or f"{variation.remark}\nDouble click: vary this one")
     if again:
         state.trail.append((state.base, state.seed))
         begin(ui, state, ui.studio.scene if _number_of(ui, state) == number else variation.scene)

@@ -7,13 +7,25 @@ go through the studio, so that each can be undone; a drag is one step.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
-
-from imgui_bundle import imgui
+from typing import Any, TypeVar
 
 from clfractal.schema.mapped import Map
+from clfractal.viewer.editing import plain
 from clfractal.viewer.panels import metadata, theme
-from clfractal.viewer.panels.buttons import button, choose, icon_button, segments, text_box, tip, toggle
+from clfractal.viewer.panels.buttons import (
+    Line,
+    beside,
+    button,
+    choose,
+    clipped,
+    icon_button,
+    menu,
+    segments,
+    text_box,
+    tip,
+    toggle,
+    wrapped,
+)
 from clfractal.viewer.panels.color_button import color_button
 from clfractal.viewer.panels.layout import (
     boxes,
@@ -31,22 +43,28 @@ from clfractal.viewer.panels.layout import (
     search,
     word,
 )
-from clfractal.viewer.panels.metadata import Meta, Target, find, plain
+from clfractal.viewer.panels.metadata import Meta, Target, differs, find, first_value, has_default
 from clfractal.viewer.panels.number_box import Change, Scale, number_box
 from clfractal.viewer.panels.ui import Ui
 
 __all__ = [
     "Change",
+    "Line",
     "Scale",
+    "act",
     "apply",
+    "beside",
     "boxes",
     "button",
     "choose",
+    "clipped",
     "color_button",
     "columns",
+    "copy_and_remove",
     "field",
     "fields",
     "filtering",
+    "first_value",
     "found",
     "group",
     "header",
@@ -55,8 +73,14 @@ __all__ = [
     "in_labels",
     "in_row",
     "label_of",
+    "listed",
+    "menu",
     "number",
     "number_box",
+    "numbers",
+    "optional",
+    "pick",
+    "plain",
     "problem",
     "put",
     "reading",
@@ -64,13 +88,18 @@ __all__ = [
     "search",
     "section",
     "segments",
+    "set_entries",
+    "switch",
     "text_box",
     "tip",
     "toggle",
     "value",
     "value_tip",
     "word",
+    "wrapped",
 ]
+
+T = TypeVar("T")
 
 AUTO = "automatic"
 
@@ -90,10 +119,8 @@ def value_tip(ui: Ui, path: str) -> str:
     """What the schema says of a value; of a section that it does not describe, the first sentence about its class."""
     found = find(ui.studio.scene, path)
     meta = found.meta if found is not None else None
-    if meta is None:
-        return ""
-    if meta.description or not meta.sections:
-        return meta.description
+    if meta is None or meta.description or not meta.sections:
+        return meta.description if meta is not None else ""
     return (meta.sections[0].__doc__ or "").split("\n\n")[0].strip()
 
 
@@ -109,10 +136,124 @@ def apply(ui: Ui, path: str, change: Change, make: Callable[[float], Any] = lamb
 
 def reading(ui: Ui, label: str, text: str, color: theme.Rgba = theme.TEXT) -> None:
     """A row that only tells something."""
-    width = row(ui, label)
-    if width is not None:
-        imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec(color), text)
+    if row(ui, label) is not None:
+        beside(text, color)
+
+
+def pick(
+    ui: Ui,
+    label: str,
+    words: Mapping[T, str],
+    current: T,
+    *,
+    path: str,
+    name: str = "",
+    listed: bool = False,
+    **options: Any,
+) -> T | None:
+    """A row with choices that the schema does not know by itself; the one that was clicked, if it is another.
+
+    Args:
+        words: the choices.
+        name: of the widget; else the path.
+        listed: in a list instead of side by side.
+        options: see `row`.
+    """
+    width = row(ui, label, path=path, **options)
+    if width is None:
+        return None
+    found = (choose if listed else segments)(name or path, words, current, width)
+    problem(ui, path)
+    return found
+
+
+def switch(ui: Ui, label: str, on: bool, *, path: str, name: str = "", **options: Any) -> bool:
+    """A row with a switch; whether it was clicked. For `name` and `options` see `pick`."""
+    return row(ui, label, path=path, **options) is not None and toggle(name or path, on)
+
+
+def optional(ui: Ui, path: str, label: str, first: Any, *, tip: str = "", keeps: bool = True) -> bool:
+    """The switch of a section that may be null; whether it is there.
+
+    Args:
+        first: its values when it is switched on.
+        tip: what it means, if the schema does not tell it.
+        keeps: whether the values that it had come back when it is switched on again.
+    """
+    given, kept = value(ui, path) is not None, ui.memory.setdefault("kept", {})
+    about = tip or value_tip(ui, path)
+    if switch(ui, label, given, path=path, tip=about, differs=given, reset=lambda: put(ui, path, None)):
+        if given and keeps:
+            kept[path] = ui.studio.value(path)
+        put(ui, path, None if given else kept.get(path, first))
+    problem(ui, path)
+    return value(ui, path) is not None
+
+
+def act(
+    ui: Ui,
+    action: str,
+    icon: str,
+    about: str,
+    *,
+    text: str = "",
+    on: bool = False,
+    enabled: bool = True,
+    **options: Any,
+) -> bool:
+    """A button that does an action of the table of keys, with its key in the tooltip; whether it was clicked.
+
+    Args:
+        text: its words; without any it is a square one.
+        on, enabled, options: see `icon_button` and `button`.
+    """
+    told = ui.with_key(about, action) if about else ui.keys.hint(action)
+    if text:
+        clicked = button(text, icon=icon, about=told, enabled=enabled, **options)
+    else:
+        clicked = icon_button(icon, told, name=action, on=on, enabled=enabled)
+    if clicked:
+        ui.act(action)
+    return clicked
+
+
+# Lists
+
+
+def listed(ui: Ui, key: str, count: int, line: Callable[[int, bool], bool]) -> int:
+    """The lines of a list; the number of the one that is chosen, which is kept in `ui.memory[key]`.
+
+    Args:
+        line: draws one, by its number and whether it is chosen; whether it was clicked.
+    """
+    chosen = min(int(ui.memory.get(key, 0)), max(count - 1, 0))
+    for index in range(count):
+        if line(index, index == chosen):
+            chosen = index
+    ui.memory[key] = chosen
+    return chosen
+
+
+def set_entries(ui: Ui, path: str, entries: Sequence[Any], key: str, chosen: int) -> bool:
+    """Sets a list of the scene, of which another entry is chosen then; whether it was valid."""
+    done = put(ui, path, entries)
+    if done:
+        ui.memory[key] = chosen
+    return done
+
+
+def copy_and_remove(ui: Ui, path: str, entries: Sequence[Any], key: str, room: bool, **other: Any) -> None:
+    """Buttons that copy and remove the chosen entry of a list; `other`: values that a copy has instead."""
+    chosen, there = ui.memory[key], bool(entries)
+    in_row(4)
+    if icon_button(theme.COPY, "Duplicate", enabled=there and room):
+        set_entries(ui, path, [*entries, {**entries[chosen], **other}], key, len(entries))
+    in_row(4)
+    if icon_button(theme.TRASH, "Remove", enabled=there):
+        set_entries(ui, path, [*entries[:chosen], *entries[chosen + 1 :]], key, max(chosen - 1, 0))
+
+
+# Fields
 
 
 def fields(ui: Ui, prefix: str, names: Sequence[str], **options: Mapping[str, Any]) -> None:
@@ -125,7 +266,6 @@ def section(
     ui: Ui,
     path: str,
     *,
-    skip: Sequence[str] = (),
     depth: int = 0,
     of_map: Callable[[Ui, str, Map], None] | None = None,
 ) -> None:
@@ -137,8 +277,6 @@ def section(
     if found is None or not hasattr(type(found.value), "model_fields"):
         return
     for name in type(found.value).model_fields:
-        if name in skip:
-            continue
         inner = find(ui.studio.scene, f"{path}.{name}")
         meta = inner.meta if inner is not None else None
         if meta is not None and meta.kind == "section" and inner is not None and depth < 3:
@@ -194,13 +332,12 @@ def field(
         path=path,
         tip=meta.description,
         differs=differs(target, meta),
-        reset=_reset(ui, path, meta),
+        reset=(lambda: put(ui, path, meta.default)) if has_default(meta) else None,
     )
     if width is None:
         return False
     if isinstance(target.value, Map):
-        imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec(theme.TEXT), target.value.told)
+        beside(target.value.told)
         problem(ui, path)
         return False
     options = {
@@ -243,20 +380,11 @@ def number(
         return int(value) if scale.whole else value
 
     different = default is not None and current != default
-    reset = (lambda: _set(ui, path, written(default))) if default is not None else None
+    reset = (lambda: put(ui, path, written(default))) if default is not None else None
     width = row(ui, label, path=path, tip=tip, differs=different, reset=reset)
-    if width is None:
-        return
-    change = number_box(boxes(ui), path, current, width, scale)
-    apply(ui, path, change, written)
-    problem(ui, path)
-
-
-def differs(target: Target, meta: Meta) -> bool:
-    """Whether a value is not its default; those that have to be given have none."""
-    if meta.default is None and not meta.optional:
-        return False
-    return bool(plain(target.value) != meta.default)
+    if width is not None:
+        apply(ui, path, number_box(boxes(ui), path, current, width, scale), written)
+        problem(ui, path)
 
 
 def scale_of(meta: Meta, **options: Any) -> Scale:
@@ -277,16 +405,6 @@ def scale_of(meta: Meta, **options: Any) -> Scale:
     )
 
 
-def _reset(ui: Ui, path: str, meta: Meta) -> Callable[[], None] | None:
-    if meta.default is None and not meta.optional:
-        return None
-    return lambda: _set(ui, path, meta.default)
-
-
-def _set(ui: Ui, path: str, new: Any) -> None:
-    ui.studio.edit({path: new})
-
-
 def _optional(
     ui: Ui,
     path: str,
@@ -301,35 +419,10 @@ def _optional(
     if toggle(f"{path}.given", given, "Set it by hand" if not given else f"Back to {auto}"):
         empty: dict[str, Any] = {path: meta.alternative or None}
         ui.studio.edit(empty if given else {**keep, path: first_value(meta, start)})
-    imgui.same_line(0, 6)
-    used = 28.0 + 6
+    in_row(6)
     if not given:
-        imgui.align_text_to_frame_padding()
-        imgui.text_colored(theme.vec(theme.FAINT), auto)
-    return width - used
-
-
-def first_value(meta: Meta, start: Any = None) -> Any:
-    """A value for a field that was null and is now to be set: `start`, its default, or the middle of its usual range."""
-    if start is not None:
-        return plain(start)
-    if meta.default is not None:
-        return meta.default
-    if meta.kind == "choice":
-        return meta.choices[0]
-    if meta.kind == "vector":
-        return [0.0, 0.0, 1.0] if meta.size == 3 else [0.5] * meta.size
-    if meta.kind == "color":
-        return [1.0, 1.0, 1.0]
-    if meta.kind == "text":
-        return ""
-    if meta.kind == "flag":
-        return True
-    middle = 1.0
-    if meta.usual is not None:
-        low, high = meta.usual
-        middle = float(f"{(low * high) ** 0.5:.2g}") if meta.log else (low + high) / 2
-    return round(middle) if meta.kind == "whole" else middle
+        beside(auto, theme.FAINT)
+    return width - (28.0 + 6)
 
 
 Options = Mapping[str, Any]
@@ -364,13 +457,31 @@ def _vector(ui: Ui, path: str, target: Target, meta: Meta, width: float, options
     # Three numbers need the whole width of a dock, below the label.
     wide = columns(len(target.value))
     scale = scale_of(meta, unit=options["unit"], factor=options["factor"], step=options["step"])
-    before = list(target.value)
+    numbers(ui, path, target.value, wide, scale)
+
+
+def numbers(
+    ui: Ui,
+    path: str,
+    before: Sequence[float],
+    width: float,
+    scale: Scale,
+    *,
+    marked: bool = True,
+    make: Callable[[list[float]], Any] = list,
+) -> None:
+    """Boxes side by side for the numbers of a list.
+
+    Args:
+        marked: whether they have the colours of x, y and z.
+        make: turns the numbers into the value.
+    """
     for index, each in enumerate(before):
         if index:
-            imgui.same_line(0, 4)
-        mark = theme.AXES[index] if index < 3 else None
-        change = number_box(boxes(ui), f"{path}.{index}", float(each), wide, scale, mark=mark)
-        apply(ui, path, change, lambda new, at=index: [*before[:at], new, *before[at + 1 :]])  # type: ignore[misc]
+            in_row(4)
+        mark = theme.AXES[index] if marked and index < 3 else None
+        change = number_box(boxes(ui), f"{path}.{index}", float(each), width, scale, mark=mark)
+        apply(ui, path, change, lambda new, at=index: make([*before[:at], new, *before[at + 1 :]]))  # type: ignore[misc]
 
 
 def _color(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
