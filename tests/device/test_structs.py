@@ -10,11 +10,11 @@ import pyopencl as cl
 import pytest
 from pyopencl.tools import match_dtype_to_c_struct
 
-from clfractal.device import struct_layout as layout
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.errors import DeviceError
+from tests.device.struct_layout import verify
 
 pytestmark = pytest.mark.conformance
 
@@ -52,7 +52,7 @@ def test_layout_is_that_of_c() -> None:
 
 def test_the_device_agrees(device: Device, empty_cache: Path) -> None:
     for precision in _precisions(device):
-        layout.verify(device, [_PLAIN, _MIXED], precision, isolated=False)
+        verify(device, [_PLAIN, _MIXED], precision)
 
 
 def test_pyopencl_agrees(device: Device) -> None:
@@ -67,17 +67,9 @@ def test_another_layout_is_refused(
     packed = np.dtype([("a", "float32"), ("b", "int32", (2,)), ("hidden", "int32")])
     monkeypatch.setattr(Struct, "dtype", lambda self, precision: packed)
     with pytest.raises(DeviceError, match="lays out structs differently from C") as caught:
-        layout.verify(device, [_PLAIN], "float32", isolated=False)
+        verify(device, [_PLAIN], "float32")
     assert caught.value.status == 3
     assert caught.value.details.endswith("expected sizes and offsets [16, 0, 4, 12], found [12, 0, 4, 0]")
-
-
-def test_a_layout_is_asked_once(device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    layout.verify(device, [_PLAIN], "float32", isolated=False)
-    monkeypatch.setattr(layout, "build", None)
-    layout.verify(device, [_PLAIN], "float32", isolated=False)
-    with pytest.raises(TypeError):
-        layout.verify(device, [_MIXED], "float32", isolated=False)
 
 
 def test_values_arrive(device: Device, empty_cache: Path) -> None:
@@ -104,7 +96,7 @@ def test_values_arrive(device: Device, empty_cache: Path) -> None:
     )
     if len(records) == 0:
         return
-    kernel = build(device, text, flags=math_flags("float32"), isolated=False).kernel("sum")
+    kernel = build(device, text, flags=math_flags("float32")).kernel("sum")
     flags = cl.mem_flags.READ_WRITE | cl.mem_flags.COPY_HOST_PTR
     out = device.buffer(8, "sums")
     source = cl.Buffer(device.context, flags, hostbuf=records.view(np.uint8))

@@ -8,7 +8,7 @@ from itertools import chain
 from typing import Any
 
 from clfractal.device import lane_probe as probe
-from clfractal.device import peak, struct_layout
+from clfractal.device import peak
 from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
 from clfractal.engine import canvas, show
@@ -22,6 +22,7 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels import programs
+from tests.device import struct_layout
 from tests.portability.pictures import CHANNELS, SIZE, cases, scene_of
 
 Named = tuple[str, FlatText]

@@ -2,17 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import pyopencl as cl
 import pytest
 from pyopencl.tools import match_dtype_to_c_struct
 
-from clfractal.device import cache
 from clfractal.device.select import choose, has_float64
-from clfractal.device.struct_layout import verify
 from clfractal.device.structs import Precision, Struct
 from clfractal.integrators.declarations import STRUCTS
+from tests.device.struct_layout import verify
 
 pytestmark = pytest.mark.conformance
 
@@ -20,14 +17,10 @@ PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
 
 @pytest.mark.parametrize("precision", PRECISIONS)
-def test_every_struct_is_laid_out_as_on_the_host(
-    precision: Precision, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Asked anew: what an earlier run remembered is of another cache."""
-    monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path))
+def test_every_struct_is_laid_out_as_on_the_host(precision: Precision) -> None:
     device = choose()
     if precision == "float32" or has_float64(device.info):
-        verify(device, STRUCTS, precision, isolated=False)
+        verify(device, STRUCTS, precision)
 
 
 @pytest.mark.parametrize("struct", STRUCTS, ids=lambda struct: str(struct.name))

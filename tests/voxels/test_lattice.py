@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
 from clfractal.device.select import has_float64
-from clfractal.device.struct_layout import verify
 from clfractal.device.structs import Precision
 from clfractal.scene.volume import Box
 from clfractal.voxels.lattice import (
@@ -25,6 +24,7 @@ from clfractal.voxels.lattice import (
     unpack_places,
 )
 from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, empty_cubes
+from tests.device.struct_layout import verify
 from tests.devices import device
 
 
@@ -157,4 +157,4 @@ def test_empty_cubes_are_quick() -> None:
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_the_device_lays_structs_out_as_we_do(precision: Precision) -> None:
     if precision == "float32" or has_float64(device().info):
-        verify(device(), (LATTICE, EXTENT), precision, isolated=False)
+        verify(device(), (LATTICE, EXTENT), precision)

@@ -1,4 +1,4 @@
-"""Asks a device whether its compiler lays structs out as NumPy does; once per device, driver and struct."""
+"""Asks a device whether its compiler lays structs out as NumPy does."""
 
 from __future__ import annotations
 
@@ -8,16 +8,13 @@ from typing import Any
 import numpy as np
 import pyopencl as cl
 
-from clfractal.device import cache
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision, Struct
 from clfractal.errors import DeviceError
 
-_SECTION = "layouts"
 
-
-def verify(device: Device, structs: Iterable[Struct], precision: Precision, *, isolated: bool = True) -> None:
+def verify(device: Device, structs: Iterable[Struct], precision: Precision) -> None:
     """Compare size and offsets of every struct on the device with those of its NumPy dtype.
 
     The kernel is made of the very text that programs are made of. (`pyopencl.tools.match_dtype_to_c_struct`
@@ -27,11 +24,8 @@ def verify(device: Device, structs: Iterable[Struct], precision: Precision, *, i
         DeviceError: status 3, they differ.
     """
     checked = tuple(structs)
-    key = cache.key_of(device.info.key, precision, [struct.c_text(precision) for struct in checked])
-    if key in cache.recall(_SECTION):
-        return
     text = program_text(checked, precision)
-    program = build(device, text, flags=math_flags(precision), isolated=isolated)
+    program = build(device, text, flags=math_flags(precision), isolated=False)
     expected = np.concatenate([_layout(struct, precision) for struct in checked])
     found = np.empty_like(expected)
     kernel = program.kernel("layout")
@@ -46,7 +40,6 @@ def verify(device: Device, structs: Iterable[Struct], precision: Precision, *, i
             f"{device.info.name}: the driver lays out structs differently from C",
             details=f"expected sizes and offsets {expected.tolist()}, found {found.tolist()}",
         )
-    cache.remember(_SECTION, key, True)
 
 
 def _layout(struct: Struct, precision: Precision) -> np.typing.NDArray[np.uint32]:
