@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import closing
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +49,6 @@ class FilmScenes:
 
     def __init__(self, engine: AnyEngine, scene: Scene) -> None:
         self._engine, self.movement = engine, movement_of(scene)
-        self._first: Scene | None = None
 
     @property
     def count(self) -> int:
@@ -65,14 +65,13 @@ class FilmScenes:
         found = self.movement.scene(number)
         if not isinstance(found.output.exposure, str):
             return found
-        output = found.output.model_copy(update={"exposure": self._measured().output.exposure})
+        output = found.output.model_copy(update={"exposure": self._first.output.exposure})
         return found.model_copy(update={"output": output})
 
-    def _measured(self) -> Scene:
+    @cached_property
+    def _first(self) -> Scene:
         """Frame 0 with numbers in the place of what is to be measured."""
-        if self._first is None:
-            self._first = self._engine.settled(self.movement.scene(0))
-        return self._first
+        return self._engine.settled(self.movement.scene(0))
 
 
 def frames(

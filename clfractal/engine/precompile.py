@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 from clfractal.device import children, program
@@ -104,19 +105,24 @@ class Precompilation:
         ended = CancelToken()
         done = compiled = 0
         wanted = sorted(self._wanted.values(), key=lambda each: -len(each.text.flat.text))
-        works = [*self._others(ended), *(self._work(each, ended) for each in wanted)]
+        # Those of a window and of volumes build their own programs, which are not counted.
+        works: list[Callable[[], object]] = [
+            *(partial(make, self.device) for make in (CanvasKernels, Shower)),
+            *(partial(self._fill, job, ended) for job in self._volumes),
+            *(partial(self._build, each, ended) for each in wanted),
+        ]
         # Oclgrind's checks of memory are lost with the thread that they began in.
         if is_simulator(self.device.info):
             for done, work in enumerate(works):
                 progress(done)
-                compiled += work()
+                compiled += work() is True
             return Compiled(len(wanted), compiled, self._unkept())
         pool = ThreadPoolExecutor(children.processors())
         try:
-            waiting: set[Future[int]] = {pool.submit(work) for work in works}
+            waiting: set[Future[object]] = {pool.submit(work) for work in works}
             while waiting:
                 finished, waiting = wait(waiting, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
-                compiled += sum(each.result() for each in finished)
+                compiled += sum(each.result() is True for each in finished)
                 done += len(finished)
                 progress(done)
         except BaseException:
@@ -127,44 +133,25 @@ class Precompilation:
             pool.shutdown(wait=not ended(), cancel_futures=True)
         return Compiled(len(wanted), compiled, self._unkept())
 
-    def _work(self, wanted: Wanted, ended: CancelToken) -> Callable[[], int]:
-        def work() -> int:
-            if self._is_kept(wanted):
-                return 0
-            text = wanted.text.flat
-            program.build(
-                self.device,
-                text.text,
-                flags=wanted.flags,
-                sources=text.sources,
-                warm=wanted.warm,
-                stopped=ended,
-                what=wanted.text.name,
-            )
-            return 1
+    def _build(self, wanted: Wanted, ended: CancelToken) -> bool:
+        """Compiles a program if the cache lacks it, and says whether it did."""
+        if self._is_kept(wanted):
+            return False
+        text = wanted.text.flat
+        program.build(
+            self.device,
+            text.text,
+            flags=wanted.flags,
+            sources=text.sources,
+            warm=wanted.warm,
+            stopped=ended,
+            what=wanted.text.name,
+        )
+        return True
 
-        return work
-
-    def _others(self, ended: CancelToken) -> Iterator[Callable[[], int]]:
-        """What builds its own programs."""
-
-        def window(make: Callable[[Device], object]) -> Callable[[], int]:
-            def work() -> int:
-                make(self.device)
-                return 0
-
-            return work
-
-        def volume(job: Job) -> Callable[[], int]:
-            def work() -> int:
-                LocalExecutor(self.device).make_ready(job, ended)
-                return 0
-
-            return work
-
-        yield from (window(each) for each in (CanvasKernels, Shower))
-        # A grid is filled for its programs: one that fills at once.
-        yield from (volume(job) for job in self._volumes)
+    def _fill(self, job: Job, ended: CancelToken) -> None:
+        """Fills a grid for its programs: one that fills at once."""
+        LocalExecutor(self.device).make_ready(job, ended)
 
     def _is_kept(self, wanted: Wanted) -> bool:
         return program.is_kept(self.device, wanted.text.flat.text, flags=wanted.flags, warm=wanted.warm)

@@ -8,7 +8,6 @@ from typing import Any, cast
 
 from clfractal.camera.views import seen_by, shown_views
 from clfractal.device.select import Device, has_float64
-from clfractal.device.structs import Precision
 from clfractal.engine.job import Composition, Identity, Job, Paste, StereoPair
 from clfractal.errors import SceneError, Where, arguments
 from clfractal.files.channels import ALBEDO, NOISY, NORMAL, check_channels
@@ -73,9 +72,16 @@ def prepare(
     if channels is not None:
         where = "channels"
         names = check_channels(arguments.words("channels", channels), Where(path=where))
-    chooser = _Chooser(device, precision)
     # One number type for both eyes, chosen for the view of the eye between them.
-    chosen = [chooser.number_type(view, eye) for view, eye, _ in shown_views(scene)]
+    chosen = [
+        choose_precision(
+            view,
+            cast(PrecisionChoice, precision or view.renderer.precision),
+            has_float64=has_float64(device.info),
+            eye=eye,
+        )
+        for view, eye, _ in shown_views(scene)
+    ]
     views: list[PlannedView] = []
 
     def part(seen: Scene, eye: Eye, wanted: Region) -> Identity | Paste:
@@ -87,7 +93,7 @@ def prepare(
                 continue
             check_layers(view, names, where)
             taken = samples if samples is not None else view.renderer.samples
-            plan = Plan(chosen[number], 1, taken, needed, _rendered(view, names))
+            plan = Plan(chosen[number][0], 1, taken, needed, _rendered(view, names))
             numbers.append(len(views))
             places.append(place)
             planned = PlannedView(view, plan, own_eye, number)
@@ -114,7 +120,8 @@ def prepare(
     if measures is None:
         measures = pays_to_measure(views, device, pictures)
     found = tuple(with_lanes(views, device, measures=measures, on_start=on_start))
-    return Job(scene, found, composition, names, device.info, chooser.remark)
+    remark = next((remark for _, remark in chosen if remark), "")
+    return Job(scene, found, composition, names, device.info, remark)
 
 
 def with_size(scene: Scene, size: Any) -> Scene:
@@ -192,23 +199,6 @@ def _rendered(view: Scene, names: tuple[str, ...]) -> tuple[str, ...]:
         of_surfaces = (*ALBEDO, *NORMAL) if isinstance(view.renderer, SurfaceRenderer) else ()
         found += [name for name in ("A", *of_surfaces) if name not in found]
     return tuple(found)
-
-
-class _Chooser:
-    """Chooses number types for one device."""
-
-    def __init__(self, device: Device, precision: str | None) -> None:
-        self.device, self.wanted = device, precision
-        self.remark = ""
-
-    def number_type(self, view: Scene, eye: Eye) -> Precision:
-        wanted = self.wanted if self.wanted is not None else view.renderer.precision
-        info = self.device.info
-        used, remark = choose_precision(
-            view, cast(PrecisionChoice, wanted), has_float64=has_float64(info), eye=eye
-        )
-        self.remark = self.remark or remark
-        return used
 
 
 def _within(region: Region, place: Place) -> Region | None:

@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Protocol
 
 import numpy as np
@@ -57,14 +57,8 @@ class Counters:
 
     def add(self, other: Counters) -> None:
         """Adds what other work took."""
-        self.rays += other.rays
-        self.hits += other.hits
-        self.steps += other.steps
-        self.iterations += other.iterations
-        self.bad_distances += other.bad_distances
-        self.waits += other.waits
-        self.kernel_ms += other.kernel_ms
-        self.build_ms += other.build_ms
+        for each in fields(Counters):
+            setattr(self, each.name, getattr(self, each.name) + getattr(other, each.name))
 
 
 @dataclass(frozen=True, slots=True)
