@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -18,6 +16,7 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.kernels import Lease
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device, is_simulator
+from clfractal.device.threads import ending_together
 from clfractal.device.watched import Watched, is_watched
 from clfractal.engine.stages import CAPACITY, Span, Stages, Wave, group_of, number_count, wave_of
 from clfractal.images.tiles import TILE, TileGrid
@@ -154,7 +153,8 @@ class Drawing:
         self.build_ms = self.device.loaded.building.milliseconds - built_before
         other = [each.cl_program for each in built] != [each.cl_program for each in self._programs]
         if other or self.view is None or view.scene.formula.iterations > self.view.scene.formula.iterations:
-            self._begin_pace()
+            # One sample of a tile for each core, because the speed is not known yet.
+            self.pace = Pace(float(max(self.device.info.compute_units, 1) * self.packets))
         self._programs, self.view = built, view
         self.outputs.fit(framebuffer, statistics, self.capacity * 16)
         self.outputs.fit_wave(self.wave.sizes)
@@ -285,17 +285,15 @@ class Drawing:
                 sources=text.flat.sources,
                 warm=launches,
                 on_compile=resources.on_compile,
-                stopped=lambda: ended.is_set() or (resources.token is not None and resources.token()),
+                stopped=lambda: ended() or (resources.token is not None and resources.token()),
                 waits=resources.waits,
                 what=text.name,
             )
 
         # Side by side: each is compiled by a process of its own. What ends one, or this thread, ends all. Those begin first
         # that take longest, which are the longest texts, since a compiler that is left with one at the end is waited for.
-        ended = threading.Event()
         # One thread more than compilers, so that none waits while what it has made is loaded.
-        pool = ThreadPoolExecutor(min(len(texts), children.processors() + 1))
-        try:
+        with ending_together(min(len(texts), children.processors() + 1)) as (pool, ended):
             # Oclgrind's checks of memory are lost with the thread that they began in.
             if is_simulator(self.device.info):
                 built = list(map(build, texts, warm))
@@ -303,18 +301,8 @@ class Drawing:
                 jobs = sorted(zip(texts, warm, strict=True), key=lambda job: -len(job[0].flat.text))
                 under_way = {job[0].name: pool.submit(build, *job) for job in jobs}
                 built = [under_way[text.name].result() for text in texts]
-        except BaseException:
-            ended.set()
-            raise
-        finally:
-            # After an interrupt nobody waits for a child that is just being started.
-            pool.shutdown(wait=not ended.is_set(), cancel_futures=True)
         self._texts, self._flags = texts, flags
         return built
-
-    def _begin_pace(self) -> None:
-        """One sample of a tile for each core, because the speed is not known yet."""
-        self.pace = Pace(float(max(self.device.info.compute_units, 1) * self.packets))
 
     def _upload(self, arguments: list[KernelArgument]) -> None:
         """Brings arguments to the device that differ from those of the view before."""

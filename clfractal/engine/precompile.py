@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from concurrent.futures import FIRST_COMPLETED, Future, wait
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -11,6 +11,7 @@ from pathlib import Path
 from clfractal.device import children, program
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, is_simulator
+from clfractal.device.threads import ending_together
 from clfractal.engine.canvas import CanvasKernels
 from clfractal.engine.drawing import Drawing, OutputBuffers, Wanted
 from clfractal.engine.job import Job
@@ -102,35 +103,27 @@ class Precompilation:
             KernelBuildError: a program does not compile.
             DeviceError: the driver failed.
         """
-        ended = CancelToken()
         done = compiled = 0
         wanted = sorted(self._wanted.values(), key=lambda each: -len(each.text.flat.text))
-        # Those of a window and of volumes build their own programs, which are not counted.
-        works: list[Callable[[], object]] = [
-            *(partial(make, self.device) for make in (CanvasKernels, Shower)),
-            *(partial(self._fill, job, ended) for job in self._volumes),
-            *(partial(self._build, each, ended) for each in wanted),
-        ]
-        # Oclgrind's checks of memory are lost with the thread that they began in.
-        if is_simulator(self.device.info):
-            for done, work in enumerate(works):
-                progress(done)
-                compiled += work() is True
-            return Compiled(len(wanted), compiled, self._unkept())
-        pool = ThreadPoolExecutor(children.processors())
-        try:
+        with ending_together(children.processors()) as (pool, ended):
+            # Those of a window and of volumes build their own programs, which are not counted.
+            works: list[Callable[[], object]] = [
+                *(partial(make, self.device) for make in (CanvasKernels, Shower)),
+                *(partial(self._fill, job, ended) for job in self._volumes),
+                *(partial(self._build, each, ended) for each in wanted),
+            ]
+            # Oclgrind's checks of memory are lost with the thread that they began in.
+            if is_simulator(self.device.info):
+                for done, work in enumerate(works):
+                    progress(done)
+                    compiled += work() is True
+                return Compiled(len(wanted), compiled, self._unkept())
             waiting: set[Future[object]] = {pool.submit(work) for work in works}
             while waiting:
                 finished, waiting = wait(waiting, timeout=_LOOK_SECONDS, return_when=FIRST_COMPLETED)
                 compiled += sum(each.result() is True for each in finished)
                 done += len(finished)
                 progress(done)
-        except BaseException:
-            ended.cancel()
-            raise
-        finally:
-            # After an interrupt nobody waits for a child that is just being started.
-            pool.shutdown(wait=not ended(), cancel_futures=True)
         return Compiled(len(wanted), compiled, self._unkept())
 
     def _build(self, wanted: Wanted, ended: CancelToken) -> bool:

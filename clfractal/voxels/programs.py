@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import threading
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -17,6 +15,7 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
+from clfractal.device.threads import ending_together
 from clfractal.geometry.solids import Body
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.grid import Kind
@@ -87,15 +86,11 @@ def build_all(
         DeviceError: the driver failed.
         Stopped: `stopped`, which is asked from other threads, answered True.
     """
-    announced = threading.Event()
-    failed = threading.Event()
-
-    def nobody_waits() -> bool:
-        return failed.is_set() or (stopped is not None and stopped())
+    announced: list[str] = []
 
     def announce(line: str) -> None:
-        if not announced.is_set() and on_compile is not None:
-            announced.set()
+        if on_compile is not None and not announced:
+            announced.append(line)
             on_compile(line)
 
     def build(recipe: Recipe) -> Built:
@@ -109,19 +104,14 @@ def build_all(
             sources=text.sources,
             warm=[warm],
             on_compile=announce,
-            stopped=nobody_waits,
+            stopped=lambda: ended() or (stopped is not None and stopped()),
         )
         lease = Lease(device, [(built, (recipe.kernel,))])
         return Built(lease.kernel(recipe.kernel), recipe.items, recipe.group, built.build_ms, lease)
 
-    if len(recipes) == 1:
-        return [build(recipes[0])]
-    with ThreadPoolExecutor(max(len(recipes), 1)) as pool:
-        try:
-            return list(pool.map(build, recipes))
-        except BaseException:  # an interrupt too: the other programs are not waited for
-            failed.set()
-            raise
+    with ending_together(max(len(recipes), 1)) as (pool, ended):
+        # (One alone is built in this thread.)
+        return list(map(build, recipes) if len(recipes) == 1 else pool.map(build, recipes))
 
 
 def takes_parts(device: Device) -> bool:
@@ -222,10 +212,6 @@ def _number_defines(lanes: int, precision: Precision) -> dict[str, object]:
     return {"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64")}
 
 
-def _sample_defines(sample: Kind) -> dict[str, object]:
-    return {"SAMPLE": C_TYPES[sample]}
-
-
 def _source_defines(source: Source, sample: Kind, alone: bool) -> dict[str, object]:
     return {
         "ALONE": int(alone),
@@ -233,5 +219,5 @@ def _source_defines(source: Source, sample: Kind, alone: bool) -> dict[str, obje
         "SOURCE": SOURCES.index(source),
         "ALL_OUTSIDE": f"({ALL_OUTSIDE})",
         "ALL_INSIDE": f"({ALL_INSIDE})",
-        **_sample_defines(sample),
+        "SAMPLE": C_TYPES[sample],
     }
