@@ -8,9 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device.launch import run_in_parts
 from clfractal.voxels.grid import Grid
-from clfractal.voxels.programs import blocks_recipe, build_all, ranges_recipe
+from clfractal.voxels.programs import Recipe, blocks_recipe, build_all, ranges_recipe
 
 BLOCK_BYTES = 8
 RANGE_BYTES = 8
@@ -32,30 +31,8 @@ def seen_blocks(grid: Grid, unseen: float, on_compile: Callable[[str], None] | N
         DeviceError: status 2 if there is no room, 3 if the device failed.
         KernelBuildError: the program does not compile.
     """
-    device, floats = grid.device, np.int32(grid.kind == "float")
-    built = build_all(device, [blocks_recipe()], on_compile)[0]
-    blocks = device.buffer(BLOCK_BYTES * grid.parts.slots, "the table of visible blocks")
-    for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
-        with device.failures("checking the grid's bricks"):
-            built.kernel.set_args(
-                blocks,
-                values,
-                np.int32(0),
-                np.int32(after - first),
-                np.int32(first),
-                floats,
-                np.float32(unseen),
-            )
-        run_in_parts(
-            device,
-            built.kernel,
-            2,
-            after - first,
-            doing="checking the grid's bricks",
-            group=built.group,
-            first_part=4096,
-        )
-    return blocks
+    doing, what = "checking the grid's bricks", "the table of visible blocks"
+    return _table(grid, blocks_recipe(), BLOCK_BYTES, doing, what, on_compile, np.float32(unseen))
 
 
 def brick_ranges(grid: Grid, on_compile: Callable[[str], None] | None = None) -> npt.NDArray[np.float32]:
@@ -65,25 +42,29 @@ def brick_ranges(grid: Grid, on_compile: Callable[[str], None] | None = None) ->
         DeviceError: status 2 if there is no room, 3 if the device failed.
         KernelBuildError: the program does not compile.
     """
-    device, floats = grid.device, np.int32(grid.kind == "float")
-    built = build_all(device, [ranges_recipe()], on_compile)[0]
-    ranges = device.buffer(RANGE_BYTES * grid.parts.slots, "the ranges of bricks")
-    for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
-        with device.failures("reading the grid's bricks"):
-            built.kernel.set_args(
-                ranges, values, np.int32(0), np.int32(after - first), np.int32(first), floats
-            )
-        run_in_parts(
-            device,
-            built.kernel,
-            2,
-            after - first,
-            doing="reading the grid's bricks",
-            group=built.group,
-            first_part=4096,
-        )
+    doing = "reading the grid's bricks"
+    ranges = _table(grid, ranges_recipe(), RANGE_BYTES, doing, "the ranges of bricks", on_compile)
     found = np.empty((grid.parts.slots, 2), np.float32)
-    with device.failures("reading the grid's bricks"):
-        cl.enqueue_copy(device.queue, found, ranges)
+    with grid.device.failures(doing):
+        cl.enqueue_copy(grid.device.queue, found, ranges)
     ranges.release()
+    return found
+
+
+def _table(
+    grid: Grid,
+    recipe: Recipe,
+    nbytes: int,
+    doing: str,
+    what: str,
+    on_compile: Callable[[str], None] | None,
+    *more: np.generic,
+) -> cl.Buffer:
+    """What a kernel finds of each slot, so many bytes; `doing` and `what` for messages, `more`: the kernel's last arguments."""
+    device, floats = grid.device, np.int32(grid.kind == "float")
+    built = build_all(device, [recipe], on_compile)[0]
+    found = device.buffer(nbytes * grid.parts.slots, what)
+    for values, (first, after) in zip(grid.values, grid.parts.ranges(), strict=True):
+        numbers = map(np.int32, (0, after - first, first))
+        built.run(device, doing, [found, values, *numbers, floats, *more], 2, after - first, first_part=4096)
     return found

@@ -11,7 +11,6 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
-from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
@@ -24,7 +23,7 @@ from clfractal.voxels.lattice import (
     pack_places,
 )
 from clfractal.voxels.octree import empty_cubes, touched
-from clfractal.voxels.pool import allocate, plan_pools
+from clfractal.voxels.pool import allocate, plan_pools, upload
 from clfractal.voxels.programs import Built
 
 OUTSIDE, INSIDE, MIXED = 0, 1, 2
@@ -89,8 +88,10 @@ def store(
     classes = np.full(count, MIXED, np.uint8)
     if classify is not None and count:
         found = device.buffer(count, "classes of bricks")
-        with device.failures("checking the grid's bricks"):
-            classify.kernel.set_args(
+        milliseconds += classify.run(
+            device,
+            "checking the grid's bricks",
+            [
                 found,
                 evaluated.bricks,
                 np.int32(0),
@@ -98,14 +99,9 @@ def store(
                 evaluated.samples,
                 evaluated.numbers,
                 extent,
-            )
-        milliseconds += run_in_parts(
-            device,
-            classify.kernel,
+            ],
             2,
             count,
-            doing="checking the grid's bricks",
-            group=classify.group,
             first_part=4096,
             token=token,
         )
@@ -137,9 +133,7 @@ def store(
     parts = plan_pools(device, slots, sizes, others, f"a grid with {slots} stored bricks")
     values = allocate(device, parts, sizes[0], "the grid's values")
     normals = allocate(device, parts, sizes[1], "the grid's normals")
-    table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
-    with device.failures("storing the grid"):
-        cl.enqueue_copy(device.queue, table, entries.reshape(-1))
+    table = upload(device, entries, "the grid's table", "storing the grid")
     if solid_slot is not None:
         _store_whole(device, values[0], normals[0], kept, solid_slot, inside=True)
     if outside_slot is not None:
@@ -148,45 +142,25 @@ def store(
         low, high = max(first - first_slot, 0), after - first_slot
         if high <= low:
             continue
-        part = device.buffer(8 * (high - low), "places", read_only=True)
-        slot = max(first_slot - first, 0)
-        with device.failures("storing the grid"):
-            cl.enqueue_copy(device.queue, part, np.ascontiguousarray(places[low:high]))
-            keep.kernel.set_args(
-                value_part,
-                normal_part,
-                part,
-                np.int32(0),
-                np.int32(high - low),
-                np.int32(slot),
-                evaluated.samples,
-                evaluated.numbers,
-                extent,
-            )
-        milliseconds += run_in_parts(
+        part = upload(device, places[low:high], "places", "storing the grid")
+        numbers = [np.int32(each) for each in (0, high - low, max(first_slot - first, 0))]
+        milliseconds += keep.run(
             device,
-            keep.kernel,
+            "storing the grid",
+            [value_part, normal_part, part, *numbers, evaluated.samples, evaluated.numbers, extent],
             3,
             high - low,
-            doing="storing the grid",
-            items=keep.items,
-            group=keep.group,
             first_part=1024,
             done=partial(_tell_from, tell, "store", low, count),
             token=token,
         )
         if refine is not None:
-            with device.failures("finding normals"):
-                refine.kernel.set_args(
-                    normal_part, part, np.int32(0), np.int32(high - low), np.int32(slot), *constants
-                )
-            refining += run_in_parts(
+            refining += refine.run(
                 device,
-                refine.kernel,
+                "finding normals",
+                [normal_part, part, *numbers, *constants],
                 2,
                 high - low,
-                doing="finding normals",
-                group=refine.group,
                 first_part=16,
                 done=partial(_tell_from, tell, "normals", low, count),
                 token=token,
@@ -243,10 +217,7 @@ def extent_buffer(
             **dict(zip(("normal_x", "normal_y", "normal_z"), across, strict=True)),
         },
     )
-    buffer = device.buffer(record.nbytes, "the grid's extent", read_only=True)
-    with device.failures("uploading constants"):
-        cl.enqueue_copy(device.queue, buffer, record.reshape(1).view(np.uint8))
-    return buffer
+    return upload(device, record, "the grid's extent")
 
 
 def _store_whole(

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels import programs
@@ -18,7 +17,7 @@ from clfractal.voxels.brick_store import extent_buffer
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import BRICK, bricks_of, pack_places
 from clfractal.voxels.octree import empty_cubes
-from clfractal.voxels.pool import allocate, plan_pools
+from clfractal.voxels.pool import allocate, plan_pools, upload
 
 # Bytes of the array that are on the device at a time, beside the grid.
 SLAB_BYTES = 1 << 28
@@ -87,9 +86,7 @@ def grid_from_dense(
         if progress is not None:
             progress(after, stored)
     entries = empty_cubes(entries)
-    table = device.buffer(entries.nbytes, "the grid's table", read_only=True)
-    with device.failures("storing the grid"):
-        cl.enqueue_copy(device.queue, table, entries.reshape(-1))
+    table = upload(device, entries, "the grid's table", "storing the grid")
     stats = GridStats(
         stored_bricks=stored,
         build_ms=built.build_ms,
@@ -153,24 +150,17 @@ class _Slabs:
             after = int(np.searchsorted(z, first + self.layers))
             bottom = max(BRICK * first - self.reach, 0)
             top = BRICK * (first + self.layers) + 1 + self.reach
-            part = np.ascontiguousarray(self.values[bottom:top])
-            slab = self.device.buffer(part.nbytes, "a slab of the grid", read_only=True)
+            part = self.values[bottom:top]
+            slab = upload(self.device, part, "a slab of the grid", "storing the grid")
             places = pack_places(x[place:after], y[place:after], z[place:after])
-            bricks = self.device.buffer(places.nbytes, "places", read_only=True)
+            bricks = upload(self.device, places, "places", "storing the grid")
             extent = extent_buffer(self.device, self.place, self.kind, 1.0, np.inf, self.opaque, bottom)
-            with self.device.failures("storing the grid"):
-                cl.enqueue_copy(self.device.queue, slab, part.reshape(-1))
-                cl.enqueue_copy(self.device.queue, bricks, places)
-                counts = map(np.int32, (0, len(places), place))
-                self.built.kernel.set_args(values, normals, bricks, *counts, slab, slab, extent)
-            milliseconds += run_in_parts(
+            milliseconds += self.built.run(
                 self.device,
-                self.built.kernel,
+                "storing the grid",
+                [values, normals, bricks, *map(np.int32, (0, len(places), place)), slab, slab, extent],
                 3,
                 len(places),
-                doing="storing the grid",
-                items=self.built.items,
-                group=self.built.group,
                 first_part=1024,
             )
             place = after

@@ -12,7 +12,6 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
-from clfractal.device.launch import run_in_parts
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.watched import Watched
@@ -25,6 +24,7 @@ from clfractal.voxels.brick_store import Evaluated, store
 from clfractal.voxels.grid import SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import Lattice, Places, all_places, lattice_of, unpack_places
 from clfractal.voxels.octree import EMPTY, FULL, Descent, descend
+from clfractal.voxels.pool import upload
 
 # Packets of one application that a core does in a second, at the least: chooses how long the first launches are.
 SLOW_APPLICATIONS = 1e7
@@ -219,17 +219,13 @@ class _Filler:
 
     def _look(self, classify_nodes: programs.Built, nodes: cl.Buffer, packets: int, cells: int) -> cl.Buffer:
         """The classes of nodes, one byte each, on the device."""
-        device, kernel = self.device, classify_nodes.kernel
-        flags = device.buffer(packets * self.lanes, "nodes")
-        with device.failures("checking the octree's nodes"):
-            kernel.set_args(flags, nodes, *map(np.int32, (0, packets, cells)), *self.constants)
-        milliseconds = run_in_parts(
-            device,
-            kernel,
+        flags = self.device.buffer(packets * self.lanes, "nodes")
+        milliseconds = classify_nodes.run(
+            self.device,
+            "checking the octree's nodes",
+            [flags, nodes, *map(np.int32, (0, packets, cells)), *self.constants],
             2,
             packets,
-            doing="checking the octree's nodes",
-            group=classify_nodes.group,
             first_part=8 * self.first_part,
             token=self.token,
             watched=[self.orbit],
@@ -259,7 +255,7 @@ class _Filler:
         source: programs.Source,
         sample: Kind,
     ) -> Evaluated:
-        device, kernel, places = self.device, fill_bricks.kernel, descent.open
+        device, places = self.device, descent.open
         brick_bytes = 64 if source == "bits" else 512 * SAMPLE_BYTES[sample]
         samples = device.buffer(max(len(places), 1) * brick_bytes, "the voxels' values")
         bricks = upload(
@@ -275,17 +271,13 @@ class _Filler:
         if sample == "byte":
             limit = self.scene.formula.iterations if self.renderer.value == "iterations" else 1
             scale = 255.0 / max(limit, 1)
-        with device.failures("filling the grid"):
-            floats = np.int32(sample == "float")
-            kernel.set_args(samples, bricks, np.int32(0), known, floats, np.float32(scale), *self.constants)
-        milliseconds = run_in_parts(
+        floats = np.int32(sample == "float")
+        milliseconds = fill_bricks.run(
             device,
-            kernel,
+            "filling the grid",
+            [samples, bricks, np.int32(0), known, floats, np.float32(scale), *self.constants],
             2,
             len(places),
-            doing="filling the grid",
-            items=fill_bricks.items,
-            group=fill_bricks.group,
             first_part=self.first_part,
             done=lambda done: self._tell("fill", done, len(places)),
             token=self.token,
@@ -314,13 +306,3 @@ class _Filler:
     def _tell(self, stage: str, done: int, total: int) -> None:
         if self.progress is not None:
             self.progress(FillProgress(stage, done, total))
-
-
-def upload(device: Device, array: npt.NDArray[Any]) -> cl.Buffer:
-    """A buffer with an array's bytes."""
-    data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
-    buffer = device.buffer(max(data.nbytes, 16), "a grid's constants", read_only=True)
-    if data.nbytes:
-        with device.failures("uploading constants"):
-            cl.enqueue_copy(device.queue, buffer, data)
-    return buffer

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Any
 
+import numpy as np
+import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.select import Device
@@ -58,3 +61,18 @@ def allocate(device: Device, parts: Parts, sample_bytes: int, what: str) -> tupl
     return tuple(
         device.buffer((after - first) * BRICK_STRIDE * sample_bytes, what) for first, after in parts.ranges()
     )
+
+
+def upload(
+    device: Device,
+    array: npt.NDArray[Any],
+    what: str = "a grid's constants",
+    doing: str = "uploading constants",
+) -> cl.Buffer:
+    """A buffer with an array's bytes; `what` and `doing` for messages."""
+    data = np.ascontiguousarray(array).reshape(-1).view(np.uint8)
+    buffer = device.buffer(max(data.nbytes, 16), what, read_only=True)
+    if data.nbytes:
+        with device.failures(doing):
+            cl.enqueue_copy(device.queue, buffer, data)
+    return buffer

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import pyopencl as cl
 
 from clfractal.device import program
 from clfractal.device.compiler import Argument, Warm
 from clfractal.device.kernels import Lease
+from clfractal.device.launch import run_in_parts
 from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
@@ -71,6 +72,27 @@ class Built:
     group: tuple[int, int]
     build_ms: float
     lease: Lease
+
+    def run(
+        self, device: Device, doing: str, arguments: Sequence[Any], first: int, count: int, **settings: Any
+    ) -> float:
+        """Sets the kernel's arguments and runs it over `count` bricks or packets; gives milliseconds on the device.
+
+        Args:
+            first: the argument that tells a part's first one; this and `settings` as of `run_in_parts`.
+        """
+        with device.failures(doing):
+            self.kernel.set_args(*arguments)
+        return run_in_parts(
+            device,
+            self.kernel,
+            first,
+            count,
+            doing=doing,
+            items=self.items,
+            group=self.group,
+            **settings,
+        )
 
 
 def build_all(
