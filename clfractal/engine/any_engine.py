@@ -22,6 +22,7 @@ from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 
 if TYPE_CHECKING:
+    from clfractal.engine.job_framebuffers import JobFramebuffers, Took
     from clfractal.engine.preview import Preview
     from clfractal.images.framebuffer import Framebuffer
 
@@ -191,17 +192,24 @@ class AnyEngine(ABC):
         self, job: Job, start: float, progress: ProgressCallback | None, token: CancelToken | None
     ) -> Framebuffer:
         """The picture of a job, in memory; `start` is when the call began, by `time.perf_counter`."""
-        from clfractal.engine.job_framebuffers import JobFramebuffers, Took
-
         if job.stays_apart:
             assert job.scene.stereo is not None
             raise SceneError(
                 f"{job.scene.stereo.mode} keeps the two eyes' pictures apart; use render_pair, or another mode",
                 Where(path="stereo.mode"),
             )
+        framebuffers, took = self._run(job, start, progress, token)
+        return framebuffers.picture(took)
+
+    def _run(
+        self, job: Job, start: float, progress: ProgressCallback | None, token: CancelToken | None
+    ) -> tuple[JobFramebuffers, Took]:
+        """Renders a job, and says what the call took."""
+        from clfractal.engine.job_framebuffers import JobFramebuffers, Took
+
         framebuffers = JobFramebuffers(job)
         state = run(job, framebuffers.framebuffers, self.executor, progress=progress, token=token)
-        return framebuffers.picture(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
+        return framebuffers, Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms)
 
     def render_pair(
         self,
@@ -216,8 +224,6 @@ class AnyEngine(ABC):
         token: CancelToken | None = None,
     ) -> tuple[Framebuffer, Framebuffer]:
         """Renders both eyes' pictures of a stereo scene; arguments, result and errors as for `clfractal.render_pair`."""
-        from clfractal.engine.job_framebuffers import JobFramebuffers, Took
-
         start = time.perf_counter()
         arguments.function("progress", progress)
         check_token(token)
@@ -232,9 +238,8 @@ class AnyEngine(ABC):
             job = self.prepare(
                 loaded, precision=precision, samples=samples, size=size, channels=channels, quality=quality
             )
-            framebuffers = JobFramebuffers(job)
-            state = run(job, framebuffers.framebuffers, self.executor, progress=progress, token=token)
-            eyes = framebuffers.eyes(Took(state, 1e3 * (time.perf_counter() - start), self.previews_built_ms))
+            framebuffers, took = self._run(job, start, progress, token)
+            eyes = framebuffers.eyes(took)
             return eyes["left"], eyes["right"]
 
     @contextmanager

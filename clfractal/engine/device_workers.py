@@ -57,7 +57,8 @@ class DeviceWorkers:
         self._signs = [0] * len(executors)
         self._threads = [
             threading.Thread(
-                target=_DeviceWorker(executor, job, shared, place, self._inbox, self._token),
+                target=self._work,
+                args=(executor, job, place),
                 name=f"clfractal-{executor.device.info.index}",
                 daemon=True,
             )
@@ -119,45 +120,29 @@ class DeviceWorkers:
                 silent.append((place, waited))
         return silent
 
-
-class _DeviceWorker:
-    """What a device's thread does: tiles as long as there are any for it."""
-
-    def __init__(
-        self,
-        executor: LocalExecutor,
-        job: Job,
-        shared: Shared,
-        place: int,
-        inbox: queue.Queue[Told],
-        token: CancelToken,
-    ) -> None:
-        self.executor, self.job, self.shared, self.place = executor, job, shared, place
-        self.inbox, self.token = inbox, token
-
-    def __call__(self) -> None:
+    def _work(self, executor: LocalExecutor, job: Job, place: int) -> None:
+        """What a device's thread does: tiles as long as there are any for it."""
         error: BaseException | None = None
-        self.executor.supply = partial(self.shared.take, self.place)
+        executor.supply = partial(self.shared.take, place)
         try:
-            items = self.shared.items(self.place)
-            with closing(self.executor.execute(self.job, items, self.token)) as results:
+            with closing(executor.execute(job, self.shared.items(place), self._token)) as results:
                 for result in results:
                     # What comes too late, others make.
-                    if self.shared.done(self.place, result.tiles):
-                        self._tell(Told(self.place, result))
+                    if self.shared.done(place, result.tiles):
+                        self._tell(Told(place, result))
         except Stopped:
             pass
         except BaseException as caught:
             error = caught
-            self.shared.lose(self.place)
+            self.shared.lose(place)
         finally:
-            self.executor.supply = None
+            executor.supply = None
         with suppress(Stopped):
-            self._tell(Told(self.place, error=error))
+            self._tell(Told(place, error=error))
 
     def _tell(self, told: Told) -> None:
         while True:
-            self.token.check()
+            self._token.check()
             with suppress(queue.Full):
-                self.inbox.put(told, timeout=_POLL_SECONDS)
+                self._inbox.put(told, timeout=_POLL_SECONDS)
                 return

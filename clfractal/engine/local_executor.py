@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterable
 from contextlib import closing
-from dataclasses import dataclass
 from functools import partial as partial_of
 
 import numpy as np
@@ -88,7 +87,7 @@ class LocalExecutor:
                     yield from self._by_samples(view, item, take, token)
                 else:
                     in_passes = item.samples != (0, view.plan.samples)
-                    places = _Places.of_all(view) if in_passes else None
+                    places = _all_places(view) if in_passes else None
                     yield from self._drawn(view, item, take, token, places)
         for number in [number for number in self._drawings if number >= len(job.views)]:
             del self._drawings[number]
@@ -145,7 +144,7 @@ class LocalExecutor:
         if self.supply is not None:  # others want some, too
             some = min(some, max(len(item.tiles) // _SHARES, 1))
         while len(tiles := take(some)):
-            places = _Places.of_all(view) if in_passes else _Places.of(tiles)
+            places = _all_places(view) if in_passes else _places_of(tiles)
             for sample in range(*item.samples):
                 part = WorkItem(item.view, tiles, (sample, sample + 1))
                 last = part.samples[1] == item.samples[1]
@@ -158,13 +157,14 @@ class LocalExecutor:
         item: WorkItem,
         take: Supply,
         token: CancelToken | None,
-        places: _Places | None,
+        places: Tiles | None,
         *,
         last: bool = True,
     ) -> Generator[Result]:
+        """Renders tiles of a view; `places`: by their numbers, where they keep what one pass leaves for the next."""
         drawing = self._drawing(item.view, view, len(item.tiles), token)
         if places is not None:
-            drawing.keep(places.room)
+            drawing.keep(int(places.max()) + 1)
         outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
         # Of what devices share each takes only what its launches under way hold.
         group = pixels_at_a_time(self.device) // TILE_PIXELS if self.supply is None else 0
@@ -185,30 +185,16 @@ def pixels_at_a_time(device: Device) -> int:
     return _PIXELS_OF_UNIT * device.info.compute_units if device.info.kind == "gpu" else 0
 
 
-@dataclass(frozen=True, slots=True)
-class _Places:
-    """Where tiles keep what one pass leaves for the next.
+def _all_places(view: PlannedView) -> Tiles:
+    """A place for each tile of a view."""
+    return np.arange(TileGrid(view.plan.region).count, dtype=np.int32)
 
-    Attributes:
-        of_tile: the place of each tile by its number.
-        room: how many places there are.
-    """
 
-    of_tile: Tiles
-    room: int
-
-    @staticmethod
-    def of_all(view: PlannedView) -> _Places:
-        """A place for each tile of a view."""
-        count = TileGrid(view.plan.region).count
-        return _Places(np.arange(count, dtype=np.int32), count)
-
-    @staticmethod
-    def of(tiles: Tiles) -> _Places:
-        """Places for some tiles."""
-        of_tile = np.zeros(int(tiles.max()) + 1, np.int32)
-        of_tile[tiles] = np.arange(len(tiles))
-        return _Places(of_tile, len(tiles))
+def _places_of(tiles: Tiles) -> Tiles:
+    """Places for some tiles, by the tiles' numbers."""
+    places = np.zeros(int(tiles.max()) + 1, np.int32)
+    places[tiles] = np.arange(len(tiles))
+    return places
 
 
 def _in_order(tiles: Tiles) -> Supply:
@@ -275,7 +261,7 @@ class _Cutter:
     """
 
     def __init__(
-        self, drawing: Drawing, item: WorkItem, take: Supply, places: _Places | None, group: int = 0
+        self, drawing: Drawing, item: WorkItem, take: Supply, places: Tiles | None, group: int = 0
     ) -> None:
         self.drawing, self.item, self.take, self.places = drawing, item, take, places
         self.first, self.end = item.samples
@@ -333,16 +319,15 @@ class _Cutter:
         return first, min(first + min(count, self.drawing.wave.packets), self.drawing.packets)
 
     def _span(self, tiles: Tiles, packets: tuple[int, int], samples: tuple[int, int], *, last: bool) -> Span:
-        mode = 0
+        mode = PASS_ADD if samples[0] > self.first else 0
         if self.places is not None or samples[1] < self.end:
             mode |= PASS_KEEP
-            if self.places is None:
+        if self.places is not None:
+            kept = self.places[tiles]
+        else:
+            kept = np.arange(len(tiles), dtype=np.int32)
+            if mode & PASS_KEEP:
                 self.drawing.keep(max(self.most, 1))
-        if samples[0] > self.first:
-            mode |= PASS_ADD
-        kept = (
-            self.places.of_tile[tiles] if self.places is not None else np.arange(len(tiles), dtype=np.int32)
-        )
         span = Span(tiles, packets, samples, mode, kept, self.slot)
         if last:
             self.slot = (self.slot + 1) % SLOTS

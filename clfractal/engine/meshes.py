@@ -161,7 +161,7 @@ def _of_file(
     talk: Talk,
 ) -> _Found:
     made = _made(volume, device, precision, folder, talk)
-    if level is None and made is not None and _has_level(made.job.scene):
+    if level is None and made is not None and grids.volume_settings(made.job.scene).level is not None:
         level = _stored(None, volume, made.job.scene)
     elif level is None:
         found = finite_range(volume.values)
@@ -170,10 +170,6 @@ def _of_file(
         level = sum(found) / 2
     talk.note(_summary(volume, level))
     return _Found(volume, level, made, True)
-
-
-def _has_level(scene: Scene) -> bool:
-    return isinstance(scene.renderer, VolumeRenderer) and scene.renderer.level is not None
 
 
 def _made(
@@ -194,7 +190,7 @@ def _made(
         return None
     if not isinstance(scene.renderer, VolumeRenderer) or scene.renderer.file is not None:
         return None
-    if not _is_along_axes(volume):
+    if not np.array_equal(volume.directions, np.diag(np.diag(volume.directions))):  # not along the axes
         return None
     chosen = choose(device)
     return Made(prepare(scene, chosen, on_start=talk.say), chosen, coloring)
@@ -206,10 +202,6 @@ def _text(made: Made) -> str:
     del resolved["coloring"]
     coloring = write_document({"coloring": made.coloring.model_dump(mode="json")})
     return write_document(resolved) + "".join(f"# {line}\n" for line in coloring.splitlines())
-
-
-def _is_along_axes(volume: Volume) -> bool:
-    return bool(np.array_equal(volume.directions, np.diag(np.diag(volume.directions))))
 
 
 def _no_surface(found: _Found, close: bool) -> ClfractalError:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
@@ -44,18 +44,29 @@ def with_quality(scene: Scene, quality: str, *, kept: Collection[str] = ()) -> S
     if quality not in PRESETS:
         raise SceneError(unknown_name("quality", quality, get_args(Quality)), Where(path="quality"))
     preset = PRESETS[quality]  # type: ignore[index]
-    updates: dict[str, Any] = {"renderer": _preset(scene.renderer, preset, "renderer", kept)}
+    return scene.model_copy(
+        update=with_renderers(scene, lambda each, path: _preset(each, preset, path, kept))
+    )
+
+
+def with_renderers(scene: Scene, change: Callable[[Any, str], Any]) -> dict[str, Any]:
+    """What is new in a scene if its renderer is changed, and those of views that have their own.
+
+    Args:
+        change: a renderer's settings and their dotted path to other settings.
+    """
+    updates: dict[str, Any] = {"renderer": change(scene.renderer, "renderer")}
     if scene.layout is not None:
         views = [
             view
             if view.renderer is None
             else view.model_copy(
-                update={"renderer": _preset(view.renderer, preset, f"layout.views.{number}.renderer", kept)}
+                update={"renderer": change(view.renderer, f"layout.views.{number}.renderer")}
             )
             for number, view in enumerate(scene.layout.views)
         ]
         updates["layout"] = scene.layout.model_copy(update={"views": views})
-    return scene.model_copy(update=updates)
+    return updates
 
 
 def _preset(renderer: Any, preset: Preset, path: str, kept: Collection[str]) -> Any:

@@ -32,7 +32,17 @@ SHARP = 4
 MOST_VIEWS = 64
 GROUP = (32, 8)
 MODES = ("ONE", "BESIDE", "BELOW", "ROWS", "COLUMNS", "CHECKERBOARD", "CHESSBOARD", "ANAGLYPH")
-_PICKED = {"rows": 3, "columns": 4, "checkerboard": 5, "anaglyph_chessboard": 6}
+_WAYS: dict[Mode, str] = {
+    "left": "ONE",
+    "right": "ONE",
+    **dict.fromkeys(BESIDE, "BESIDE"),
+    **dict.fromkeys(BELOW, "BELOW"),
+    "rows": "ROWS",
+    "columns": "COLUMNS",
+    "checkerboard": "CHECKERBOARD",
+    "anaglyph_chessboard": "CHESSBOARD",
+    "anaglyph": "ANAGLYPH",
+}
 
 SHOW = Struct(
     "Show",
@@ -363,17 +373,10 @@ def _way(look: Look) -> tuple[int, int, npt.NDArray[np.float32]]:
     if look.stereo is None:
         return MODES.index("ONE"), 0, matrix
     stereo = _joined(look.stereo)
-    mode, first = stereo.mode, int(stereo.swap)
-    if mode in ("left", "right"):
-        return MODES.index("ONE"), int(mode == "right"), matrix
-    if mode in BESIDE:
-        return MODES.index("BESIDE"), first, matrix
-    if mode in BELOW:
-        return MODES.index("BELOW"), first, matrix
+    mode, way = stereo.mode, _WAYS[stereo.mode]
     if mode == "anaglyph":
         left, right = matrices(stereo.method, stereo.glasses)
         matrix[:] = np.concatenate([left, right], axis=1).astype(np.float32).ravel()
-        return MODES.index("ANAGLYPH"), first, matrix
-    if mode == "anaglyph_chessboard":
+    elif mode == "anaglyph_chessboard":
         matrix[:6] = np.array(stereo.colors, np.float32).ravel()
-    return _PICKED[mode], first, matrix
+    return MODES.index(way), int(mode == "right" if way == "ONE" else stereo.swap), matrix

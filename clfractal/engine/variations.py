@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from clfractal.engine.any_engine import SceneLike
+from clfractal.engine.quality import with_renderers
 from clfractal.engine.varied import AMOUNT, Kind, Step, Strength, changed
 from clfractal.engine.vary_camera import camera_step, closeness, following_step
 from clfractal.engine.vary_colors import colors_step
@@ -220,16 +221,8 @@ def small_scene(scene: Scene, width: int, height: int) -> Scene:
         "image": scene.image.resized(width, height),
         "stereo": None,
         "animation": None,
+        **with_renderers(scene, lambda renderer, _: _coarse(renderer)),
     }
-    updates["renderer"] = _coarse(scene.renderer)
-    if scene.layout is not None:
-        views = [
-            view.model_copy(update={"renderer": _coarse(view.renderer)})
-            if view.renderer is not None
-            else view
-            for view in scene.layout.views
-        ]
-        updates["layout"] = scene.layout.model_copy(update={"views": views})
     return scene.model_copy(update=updates)
 
 

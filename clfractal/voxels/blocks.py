@@ -60,7 +60,12 @@ def _table(
     on_compile: Callable[[str], None] | None,
     *more: np.generic,
 ) -> cl.Buffer:
-    """What a kernel finds of each slot, so many bytes; `doing` and `what` for messages, `more`: the kernel's last arguments."""
+    """What a kernel finds of each slot, so many bytes.
+
+    Args:
+        doing, what: for messages.
+        more: the last arguments of the kernel.
+    """
     device, floats = grid.device, np.int32(grid.kind == "float")
     built = build_all(device, [recipe], on_compile)[0]
     found = device.buffer(nbytes * grid.parts.slots, what)
