@@ -135,9 +135,9 @@ def compile_and_keep(
     if not is_pocl(device.info) or os.environ.get("POCL_KERNEL_CACHE", "1") == "0":
         program = _compiled(device, text, flags, warm)
         return program, binary_of(program)
-    with driver_files.recorded() as record:
+    with driver_files.recorded() as folders:
         program = _compiled(device, text, flags, warm)
-    return program, driver_files.packed(record.folders) or binary_of(program)
+    return program, driver_files.packed(tuple(folders)) or binary_of(program)
 
 
 def _compiled(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) -> Any:

@@ -26,25 +26,18 @@ _kept: dict[str, tuple[tuple[str, ...], frozenset[str]]] = {}
 """By the key in the cache: the folders of a program, and which files of them the cache has."""
 
 
-class Record:
-    """The programs that PoCL made or loaded while it was recorded."""
-
-    def __init__(self) -> None:
-        self.folders: tuple[str, ...] = ()
-
-
 @contextmanager
-def recorded() -> Iterator[Record]:
-    """Tells of which programs PoCL makes files within the block; those of other threads may be among them."""
+def recorded() -> Iterator[list[str]]:
+    """The folders of the programs that PoCL makes or loads within the block, which are known at its end; those of other
+    threads may be among them.
+    """
     root = drivers_folder.path()
-    record = Record()
+    folders: list[str] = []
     with _recording:
         for note in root.glob(f"??/*/{_USED}"):
             note.unlink(missing_ok=True)
-        yield record
-        record.folders = tuple(
-            sorted(note.parent.relative_to(root).as_posix() for note in root.glob(f"??/*/{_USED}"))
-        )
+        yield folders
+        folders += sorted(note.parent.relative_to(root).as_posix() for note in root.glob(f"??/*/{_USED}"))
 
 
 def packed(folders: tuple[str, ...]) -> bytes:

@@ -410,14 +410,9 @@ def _describe(index: str, platform: cl.Platform, device: cl.Device) -> DeviceInf
 
 def _kind(device: cl.Device) -> Kind:
     # Oclgrind says it is every type at once, so the processor is asked for first.
-    kinds: tuple[tuple[Any, Kind], ...] = (
-        (cl.device_type.CPU, "cpu"),
-        (cl.device_type.GPU, "gpu"),
-    )
-    for bit, kind in kinds:
-        if int(device.type) & int(bit):
-            return kind
-    return "accelerator"
+    if int(device.type) & int(cl.device_type.CPU):
+        return "cpu"
+    return "gpu" if int(device.type) & int(cl.device_type.GPU) else "accelerator"
 
 
 def _double_capabilities(device: cl.Device) -> int:

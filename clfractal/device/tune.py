@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 from clfractal.device import activity, cache, isolate
 from clfractal.device.select import Device, compiles_packets_slowly, has_float64, vectorises_across_work_items
@@ -22,6 +22,8 @@ from clfractal.errors import (
     Stopped,
     UntriedError,
 )
+
+Report = TypeVar("Report")
 
 LANE_COUNTS = (1, 4, 8, 16)
 PROBE = "clfractal.device.lane_probe:lanes_job"
@@ -78,7 +80,8 @@ def lane_reports(
                 on_start = None
             report, is_known = _try(device, precision, lanes, stopped)
             if is_known:
-                cache.remember(SECTION, _name(device, precision, lanes), asdict(report))
+                name = name_of(device, precision, lanes, PROBE, _VERSION)
+                cache.remember(SECTION, name, asdict(report))
         reports.append(report)
     return tuple(reports)
 
@@ -87,7 +90,7 @@ def remembered(
     known: Mapping[str, Any], device: Device, precision: Precision, lanes: int
 ) -> LaneReport | None:
     """The report of a lane count among facts of the cache; None if it was not tried yet, or by another version."""
-    return _from_data(known.get(_name(device, precision, lanes)))
+    return recalled(LaneReport, known.get(name_of(device, precision, lanes, PROBE, _VERSION)))
 
 
 def first_lanes(
@@ -165,13 +168,14 @@ def _try(
     return LaneReport(lanes, str(answer["fault"])), True
 
 
-def _name(device: Device, precision: Precision, lanes: int) -> str:
-    """What a trial is remembered under."""
-    return " | ".join((device.info.key, precision, str(lanes), PROBE, str(_VERSION)))
+def name_of(device: Device, precision: Precision, lanes: int, job: str, version: int) -> str:
+    """What a trial by a job is remembered under."""
+    return " | ".join((device.info.key, precision, str(lanes), job, str(version)))
 
 
-def _from_data(data: Any) -> LaneReport | None:
+def recalled(kind: type[Report], data: Any) -> Report | None:
+    """A report that was remembered as data; None if there is none, or one by another version."""
     try:
-        return LaneReport(**data)
-    except TypeError:  # nothing remembered, or by another version
+        return kind(**data)
+    except TypeError:
         return None

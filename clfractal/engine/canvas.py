@@ -198,19 +198,15 @@ class CanvasStore:
         self.region = view.plan.region
         self.grid = TileGrid(self.region)
         self.header: dict[str, Any] = {}
-        self._done = np.zeros(self.grid.count, np.bool_)
-        self.provenance = Provenance(0)  # one device draws on a canvas
-
-    @property
-    def done(self) -> npt.NDArray[np.bool_]:
+        self.done = np.zeros(self.grid.count, np.bool_)
         """For each tile, whether it is finished."""
-        return self._done
+        self.provenance = Provenance(0)  # one device draws on a canvas
 
     def put_tiles(
         self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
     ) -> None:
         """Counts finished tiles; `framebuffer` holds none of them."""
-        self._done[indices] = True
+        self.done[indices] = True
 
     def tell(self, key: str, value: Any) -> None:
         """Adds an entry to the header."""

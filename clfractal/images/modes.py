@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from clfractal.scene.stereo import APART, Mode, Stereo
 
 BESIDE: tuple[Mode, ...] = ("split", "split_half")
@@ -26,6 +28,16 @@ def picture_size(stereo: Stereo, image: tuple[int, int]) -> tuple[int, int]:
     """Width and height of the finished picture, pixels; of one eye's where nothing is composed."""
     width, height = eye_size(stereo, image)
     return width * (2 if stereo.mode in BESIDE else 1), height * (2 if stereo.mode in BELOW else 1)
+
+
+def is_second(mode: Mode, x: Any, y: Any) -> Any:
+    """Whether the second eye's pixels are shown in columns and rows: those of odd rows, columns, or sums of both.
+
+    Args:
+        mode: one of PICKED.
+        x, y: numbers, or arrays of them.
+    """
+    return (x * (mode != "rows") + y * (mode != "columns")) % 2 == 1
 
 
 def eye_at(stereo: Stereo | None, image: tuple[int, int], x: float, y: float) -> tuple[int, float, float]:
@@ -55,6 +67,5 @@ def eye_at(stereo: Stereo | None, image: tuple[int, int], x: float, y: float) ->
     elif mode == "anaglyph":
         return 0, x, y
     else:
-        of_column, of_row = mode != "rows", mode != "columns"
-        second = bool((int(x) * of_column + int(y) * of_row) % 2)
+        second = bool(is_second(mode, int(x), int(y)))
     return int(second != stereo.swap), x, y

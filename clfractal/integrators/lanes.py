@@ -115,7 +115,7 @@ def is_measured(device: Device, precision: Precision) -> bool:
             if check is None:
                 return False
             if check.accepted:
-                report = _from_data(marched.get(_name(device, precision, lanes)))
+                report = tune.recalled(MarchReport, marched.get(_name(device, precision, lanes)))
                 if report is None:
                     return False
                 works = works or not report.fault
@@ -189,7 +189,7 @@ def _measured(
     stopped: Callable[[], bool] | None,
 ) -> MarchReport:
     key = _name(device, precision, lanes)
-    known = _from_data(cache.recall(_SECTION).get(key))
+    known = tune.recalled(MarchReport, cache.recall(_SECTION).get(key))
     if known is not None:
         return known
     on_start(f"measuring {device.info.name}, once")
@@ -221,14 +221,7 @@ def _key(device: Device, precision: Precision) -> tuple[str, str, str]:
 
 def _name(device: Device, precision: Precision, lanes: int) -> str:
     """What a measurement is remembered under."""
-    return " | ".join((device.info.key, precision, str(lanes), JOB, str(_VERSION)))
-
-
-def _from_data(data: Any) -> MarchReport | None:
-    try:
-        return MarchReport(**data)
-    except TypeError:  # not measured yet, or by another version
-        return None
+    return tune.name_of(device, precision, lanes, JOB, _VERSION)
 
 
 def march_job(request: Mapping[str, Any]) -> dict[str, Any]:
