@@ -79,7 +79,7 @@ def _met(cosines: Doubles, alpha: float, points: Doubles) -> _Met:
     out = np.stack(np.broadcast_arrays(np.sqrt(1 - cosine * cosine), 0.0 * cosine, cosine))
     one, meets_one = _mirrored(out, alpha, points[0], points[1])
     two, meets_two = _mirrored(-one, alpha, points[2], points[3])
-    before, middle, after = (_lambda(np.abs(z), alpha) for z in (cosine, one[2], two[2]))
+    before, middle, after = (shadow(np.abs(z), alpha) for z in (cosine, one[2], two[2]))
     up = one[2] > 0
     # Heights that are met have the density (1 + before) s^before in parts s of the facets below, and light escapes upwards
     # from there with the probability s^lambda: integrals of powers.
@@ -103,27 +103,41 @@ def _powers(cosine: Doubles) -> Doubles:
 
 
 def _mirrored(out: Doubles, alpha: float, u: Doubles, v: Doubles) -> tuple[Doubles, Doubles]:
-    """Where facets that are seen from `out` mirror it to, and the cosine there; `out` may look from below, too.
-
-    As `visible_normals` of `scattering.py` (Dupuy and Benyoub 2023), but for any directions, shape (3, ...).
-    """
-    stretched = _unit(np.stack([alpha * out[0], alpha * out[1], out[2]]))
-    height = 1 - u * (1 + stretched[2])
-    level, angle = np.sqrt(np.maximum(1 - height * height, 0.0)), 2 * math.pi * v
-    cap = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), height)) + stretched
-    facet = _unit(np.stack([alpha * cap[0], alpha * cap[1], cap[2]]))
-    meeting = np.clip((out * facet).sum(axis=0), 0.0, 1.0)
+    """Where facets that are seen from `out` mirror it to, and the cosine there."""
+    facet, meeting = visible_facets(out, (alpha, alpha), u, 2 * math.pi * v)
     return 2 * meeting * facet - out, meeting
 
 
-def _unit(a: Doubles) -> Doubles:
+def visible_facets(
+    out: Doubles, widths: tuple[float, float], u: Doubles, angle: Doubles
+) -> tuple[Doubles, Doubles]:
+    """Normals of facets that are seen from directions, all of equal probability, and the cosine of both.
+
+    Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps.
+
+    Args:
+        out: shape (3, ...); it may look from below, too.
+        widths: of the facets' slopes along x and y.
+        u, angle: places of 0 to 1, and 0 to 2 pi or a half of it, spread evenly.
+    """
+    stretch = np.array([*widths, 1.0]).reshape(3, *[1] * (out.ndim - 1))
+    stretched = unit_vectors(stretch * out)
+    height = 1 - u * (1 + stretched[2])
+    level = np.sqrt(np.maximum(1 - height * height, 0.0))
+    cap = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), height)) + stretched
+    facet = unit_vectors(stretch * cap)
+    return facet, np.clip((out * facet).sum(axis=0), 0.0, 1.0)
+
+
+def unit_vectors(a: Doubles) -> Doubles:
+    """Vectors of length 1 in the same directions, shape (3, ...)."""
     return np.asarray(a / np.sqrt((a * a).sum(axis=0)))
 
 
-def _lambda(cosine: Doubles, alpha: float) -> Doubles:
-    """Smith's function of GGX."""
-    square = np.maximum(cosine * cosine, 1e-20)
-    return np.asarray((np.sqrt(1 + alpha * alpha * (1 - square) / square) - 1) / 2)
+def shadow(cosine: Doubles, alpha: float) -> Doubles:
+    """Smith's function of GGX, Lambda, of directions with these cosines to the normal."""
+    tangent = (1 - cosine * cosine) / np.maximum(cosine * cosine, 1e-20)
+    return np.asarray((np.sqrt(1 + alpha * alpha * tangent) - 1) / 2)
 
 
 def _scale(wanted: Doubles, cosines: Doubles, alpha: float) -> Doubles:
@@ -155,6 +169,6 @@ def _around(o: Doubles, i: Doubles, alpha: float) -> Doubles:
     spread = 1 - high2 + alpha * alpha * high2
     normals = alpha * alpha / (math.pi * spread * spread)
     facets = (3 * place * place * normals).mean(axis=0) / (
-        4 * o * i * (1 + _lambda(o, alpha) + _lambda(i, alpha))
+        4 * o * i * (1 + shadow(o, alpha) + shadow(i, alpha))
     )
     return np.asarray(2 * math.pi * (facets + EVEN_HUNDREDTHS / 100))

@@ -22,6 +22,7 @@ from functools import cache
 import numpy as np
 
 from clfractal.device.threads import in_threads
+from clfractal.shading.facets import shadow
 from clfractal.shading.scattering import (
     COSINES,
     REFLECTANCES,
@@ -32,7 +33,6 @@ from clfractal.shading.scattering import (
     mean_albedo,
     mirrored,
     read_table,
-    shadow,
     table_cosines,
     visible_normals,
 )

@@ -30,7 +30,14 @@ import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
 from clfractal.files.resources import folder
-from clfractal.shading.facets import EVEN_HUNDREDTHS, repeated_tables, wide
+from clfractal.shading.facets import (
+    EVEN_HUNDREDTHS,
+    repeated_tables,
+    shadow,
+    unit_vectors,
+    visible_facets,
+    wide,
+)
 from clfractal.shading.spectrum import wave_colors
 
 COSINES, ROUGHNESSES, REFLECTANCES = 32, 16, 16
@@ -140,15 +147,9 @@ def _drawn_directions() -> Doubles:
 def _drawn_albedos(roughness: float, anisotropy: float) -> tuple[Doubles, Doubles]:
     """What the tables but the first one are of, in their order, and what white facets lose; by their directions."""
     out = _drawn_directions()[..., None, None]
-    widths = np.array([*_drawn_widths(roughness, anisotropy), 1.0])[:, None, None, None, None]
-    height = (np.arange(_RADII) + 0.5)[:, None] / _RADII
+    widths = _drawn_widths(roughness, anisotropy)
     angle = math.pi * (np.arange(2 * _ANGLES) + 0.5) / _ANGLES
-    stretched = _unit(widths * out)
-    height = 1 - height * (1 + stretched[2])
-    level = np.sqrt(np.maximum(1 - height * height, 0.0))
-    cap = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), height)) + stretched
-    facet = _unit(widths * cap)
-    meeting = np.clip((out * facet).sum(axis=0), 0.0, 1.0)
+    facet, meeting = visible_facets(out, widths, (np.arange(_RADII) + 0.5)[:, None] / _RADII, angle)
     other = 2 * meeting * facet - out
     one, two = (_drawn_shadow(each, widths) for each in (out, other))
     weight = np.where(other[2] > 0, (1 + one) / (1 + one + two), 0.0)
@@ -166,9 +167,10 @@ def _drawn_albedos(roughness: float, anisotropy: float) -> tuple[Doubles, Double
     )
 
 
-def _drawn_shadow(way: Doubles, widths: Doubles) -> Doubles:
+def _drawn_shadow(way: Doubles, widths: tuple[float, float]) -> Doubles:
     """Smith's function of GGX, Lambda, of the slopes along a direction."""
-    slopes = ((widths[:2] * way[:2]) ** 2).sum(axis=0) / np.maximum(way[2] ** 2, 1e-12)
+    along, across = widths
+    slopes = ((along * way[0]) ** 2 + (across * way[1]) ** 2) / np.maximum(way[2] ** 2, 1e-12)
     return np.asarray((np.sqrt(1 + slopes) - 1) / 2)
 
 
@@ -198,7 +200,7 @@ def _repeating_lobe(roughness: float, scales: Doubles, lost: Doubles) -> Doubles
     way = np.stack(np.broadcast_arrays(level * np.cos(angle), level * np.sin(angle), root * root)).reshape(
         3, 1, -1
     )
-    h = _unit(out + way)
+    h = unit_vectors(out + way)
     spread = h[0] ** 2 + h[1] ** 2 + alpha * alpha * h[2] ** 2
     shadows = shadow(out[2], alpha) + shadow(way[2], alpha)
     lobe = (
@@ -213,10 +215,6 @@ def _repeating_lobe(roughness: float, scales: Doubles, lost: Doubles) -> Doubles
     turn = np.abs(np.cos(angle)) + 0 * root
     shares = _drawn_shares(turn, root + 0 * angle).reshape(-1, DRAWN_TURNS * DRAWN_COSINES)
     return np.asarray(lobe @ shares)
-
-
-def _unit(a: Doubles) -> Doubles:
-    return np.asarray(a / np.sqrt((a * a).sum(axis=0)))
 
 
 def table_cosines() -> Doubles:
@@ -248,23 +246,13 @@ def fresnel(cosine: Doubles, ior: float) -> Doubles:
 def visible_normals(cosines: Doubles, alpha: float) -> tuple[Doubles, Doubles, Doubles]:
     """Cosines of the viewer's directions, of facets with the normal, and of both with each other.
 
-    Dupuy and Benyoub 2023, Sampling Visible GGX Normals with Spherical Caps. Shapes (cosines, 1, 1), and twice (cosines,
-    radii, angles): facets of equal probability.
+    See `visible_facets`. Shapes (cosines, 1, 1), and twice (cosines, radii, angles): facets of equal probability.
     """
     cosine = np.maximum(cosines, 1e-4)[:, None, None]
-    sine = np.sqrt(1 - cosine * cosine)
-    u = ((np.arange(_RADII) + 0.5) / _RADII)[None, :, None]
-    phi = math.pi * ((np.arange(_ANGLES) + 0.5) / _ANGLES)[None, None, :]
-    stretched = np.sqrt(alpha * alpha * sine * sine + cosine * cosine)
-    x, z = alpha * sine / stretched, cosine / stretched
-    height = 1 - u * (1 + z)
-    level = np.sqrt(np.maximum(1 - height * height, 0.0))
-    h = np.stack(
-        np.broadcast_arrays(alpha * (level * np.cos(phi) + x), alpha * level * np.sin(phi), height + z)
-    )
-    h = h / np.sqrt((h * h).sum(axis=0))
-    meeting = np.clip(h[0] * sine + h[2] * cosine, 0.0, 1.0)
-    return cosine, h[2], meeting
+    out = np.stack([np.sqrt(1 - cosine * cosine), 0.0 * cosine, cosine])
+    u, angle = (np.arange(_RADII) + 0.5)[:, None] / _RADII, math.pi * (np.arange(_ANGLES) + 0.5) / _ANGLES
+    facet, meeting = visible_facets(out, (alpha, alpha), u, angle)
+    return cosine, facet[2], meeting
 
 
 def _met(weight: Doubles, meeting: Doubles) -> Doubles:
@@ -273,12 +261,6 @@ def _met(weight: Doubles, meeting: Doubles) -> Doubles:
     mean = (weight * meeting).mean(axis=(1, 2)) / total
     square = (weight * (meeting - mean[:, None, None]) ** 2).mean(axis=(1, 2)) / total
     return np.stack([total, mean, np.sqrt(square)])
-
-
-def shadow(cosine: Doubles, alpha: float) -> Doubles:
-    """Smith's function of GGX, Lambda, of directions with these cosines to the normal."""
-    tangent = (1 - cosine * cosine) / np.maximum(cosine * cosine, 1e-20)
-    return np.asarray((np.sqrt(1 + alpha * alpha * tangent) - 1) / 2)
 
 
 def mirrored(cosine: Doubles, facet: Doubles, meeting: Doubles, alpha: float) -> Doubles:
