@@ -10,16 +10,17 @@ import numpy.typing as npt
 from clfractal.device.orbit import SHAPE_KINDS, Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.geometry.object_grids import NO_GRID, ObjectGrids, grid_defines
+from clfractal.geometry.solids import own_axes
 from clfractal.geometry.water import WAVES, wave_set
 from clfractal.scene.blends import is_glass
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import FormulaObject, VolumeObject, WaterObject
-from clfractal.schema.base import Vector, frame_of, length
+from clfractal.schema.base import Vector
 from clfractal.schema.mapped import Map
 from clfractal.schema.material import WHITE
-from clfractal.schema.shape import AXES, Level, ObjectBase, Simple, Solid
+from clfractal.schema.shape import AXES, ObjectBase, Simple
 from clfractal.shading.emitters import sampled_radiance
 from clfractal.shading.maps import MappedMaterials, glass_bodies
 from clfractal.shading.materials import used_materials
@@ -160,11 +161,7 @@ def _place(scene: Scene, each: ObjectBase) -> dict[str, object]:
         "error": max(map(abs, each.position)),
         **dict.fromkeys(("wave_sharp", "wave_reach", "wave_slope"), 0.0),
     }
-    if isinstance(each, Solid):
-        # The axes stand at right angles: each one's own number is the product with it by its square.
-        axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
-        row["sides"] = tuple(length(axis) for axis in each.axes)
-    elif isinstance(each, VolumeObject):
+    if isinstance(each, VolumeObject):
         # Those of a grid may be oblique. Its sides are as far from its middle as it is thick.
         place = placed(each, scene.grids[each.file]).place
         axes = list(2 * place.inverse / np.array(place.shape)[:, None])
@@ -172,8 +169,7 @@ def _place(scene: Scene, each: ObjectBase) -> dict[str, object]:
     elif isinstance(each, FormulaObject):
         axes = [np.array(axis) for axis in AXES]
     else:
-        assert isinstance(each, Level)
-        axes = [np.array(axis) for axis in frame_of(each.normal)]
+        axes, row["sides"] = own_axes(each)
     row.update(zip(("own_x", "own_y", "own_z"), axes, strict=True))
     if isinstance(each, WaterObject):
         waves = wave_set(each)

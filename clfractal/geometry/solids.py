@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from clfractal.device.orbit import JOINS, SOLID_KINDS, Record, orbit_record
 from clfractal.device.structs import Precision
@@ -19,7 +20,7 @@ from clfractal.scene.objects import FormulaObject, ball_of_both
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.base import frame_of, length
-from clfractal.schema.shape import Ball, Joined, Level, Simple, Solid, turned_axes
+from clfractal.schema.shape import Ball, Joined, Level, ObjectBase, Simple, Solid, turned_axes
 
 # Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
 _BESIDE = 0.5
@@ -182,15 +183,20 @@ def _chains(scene: Scene) -> tuple[Chain, ...]:
     return (scene.chain, *(chains[name] for name in scene.joined if name in chains))
 
 
+def own_axes(each: ObjectBase) -> tuple[list[npt.NDArray[np.float64]], list[float]]:
+    """Of a solid or a plane: from scene units to its own ones, and half its sides."""
+    if isinstance(each, Solid):
+        # The axes stand at right angles: each one's own number is the product with it by its square.
+        return [np.array(axis) / np.dot(axis, axis) for axis in each.axes], list(map(length, each.axes))
+    assert isinstance(each, Level)
+    return [np.array(axis) for axis in frame_of(each.normal)], [1.0, 1.0, 1.0]
+
+
 def _axes(each: Joined) -> dict[str, object]:
     """From scene units to its own ones, and half its sides."""
     if isinstance(each, FormulaObject):
         axes = [np.array(axis) / each.scale for axis in turned_axes(each.rotation)]
         sides = [1.0, 1.0, 1.0]
-    elif isinstance(each, Solid):
-        axes = [np.array(axis) / np.dot(axis, axis) for axis in each.axes]
-        sides = [length(axis) for axis in each.axes]
     else:
-        assert isinstance(each, Level)
-        axes, sides = [np.array(axis) for axis in frame_of(each.normal)], [1.0, 1.0, 1.0]
+        axes, sides = own_axes(each)
     return {"sides": sides, **dict(zip(("own_x", "own_y", "own_z"), axes, strict=True))}
