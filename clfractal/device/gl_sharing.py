@@ -1,7 +1,7 @@
 """Textures that OpenCL kernels write and OpenGL shows, without a copy in between.
 
 pyopencl's wheels are built without this part of OpenCL, but the loader inside them has its functions: they are called by
-ctypes here, and by pyopencl where it was built with them.
+ctypes here.
 
 Order of calls. In OpenGL's thread, with its context current: `current_handles`, `shares_with`, `opened_with`, and
 `SharedTexture` for a texture of the format RGBA8 that is complete (no missing mipmaps). Then, in any thread, kernels write
@@ -97,7 +97,7 @@ def opened_with(device: Device, handles: GLHandles) -> Device:
     """
     if not shares_with(device, handles):
         raise DeviceError(f"{device.info.name} does not share textures with OpenGL")
-    shared = device.reopened(sharing_properties(handles), None if cl.have_gl() else _make_context)
+    shared = device.reopened(sharing_properties(handles), _make_context)
     _ = shared.context  # made here, in OpenGL's thread
     return shared
 
@@ -117,7 +117,7 @@ class SharedTexture:
     def __init__(self, device: Device, texture: int, width: int, height: int) -> None:
         self.device = device
         self.width, self.height = width, height
-        image: cl.Image = _calls().texture(device, texture)
+        image: cl.Image = _shared_image(device, texture)
         if (image.width, image.height) != (width, height):
             found = f"{image.width} x {image.height}"
             image.release()
@@ -153,10 +153,10 @@ class SharedTexture:
         """
         if fence and self.takes_fences:
             event = _fence_event(self.device, fence)
-            _calls().acquire(self.device, queue, self.image, [event])
+            _enqueue("clEnqueueAcquireGLObjects", queue, self.image, [event])
             return
         finish_gl()
-        _calls().acquire(self.device, queue, self.image, [])
+        _enqueue("clEnqueueAcquireGLObjects", queue, self.image)
 
     def release(self, queue: cl.CommandQueue) -> None:
         """Gives the texture back; returns when the kernels have written to it and OpenGL may use it.
@@ -164,7 +164,7 @@ class SharedTexture:
         Raises:
             DeviceError: the device failed.
         """
-        _calls().release(self.device, queue, self.image)
+        _enqueue("clEnqueueReleaseGLObjects", queue, self.image)
         with self.device.failures("writing to a texture"):
             queue.finish()
 
@@ -189,65 +189,33 @@ class SharedTexture:
             image.release()
 
 
-class _LoaderCalls:
-    """By the loader's own functions."""
-
-    def texture(self, device: Device, texture: int) -> Any:
-        error = ctypes.c_int()
-        function = _function("clCreateFromGLTexture", ctypes.c_void_p)
-        flags = ctypes.c_uint64(int(cl.mem_flags.WRITE_ONLY))
-        context = ctypes.c_void_p(device.context.int_ptr)
-        target, level = ctypes.c_uint(_TEXTURE_2D), ctypes.c_int(0)
-        made = function(context, flags, target, level, ctypes.c_uint(texture), ctypes.byref(error))
-        _check("clCreateFromGLTexture", error.value)
-        return cl.Image.from_int_ptr(made, retain=False)
-
-    def acquire(
-        self, device: Device, queue: cl.CommandQueue, image: cl.Image, wait_for: Sequence[cl.Event]
-    ) -> None:
-        self._enqueue("clEnqueueAcquireGLObjects", queue, image, wait_for)
-
-    def release(self, device: Device, queue: cl.CommandQueue, image: cl.Image) -> None:
-        self._enqueue("clEnqueueReleaseGLObjects", queue, image, ())
-
-    def _enqueue(
-        self, name: str, queue: cl.CommandQueue, image: cl.Image, wait_for: Sequence[cl.Event]
-    ) -> None:
-        images = (ctypes.c_void_p * 1)(image.int_ptr)
-        events = (ctypes.c_void_p * len(wait_for))(*(event.int_ptr for event in wait_for))
-        count = ctypes.c_uint(len(wait_for))
-        function = _function(name, ctypes.c_int)
-        target = ctypes.c_void_p(queue.int_ptr)
-        _check(name, function(target, ctypes.c_uint(1), images, count, events if wait_for else None, None))
+def _shared_image(device: Device, texture: int) -> Any:
+    error = ctypes.c_int()
+    function = _function("clCreateFromGLTexture", ctypes.c_void_p)
+    flags = ctypes.c_uint64(int(cl.mem_flags.WRITE_ONLY))
+    context = ctypes.c_void_p(device.context.int_ptr)
+    target, level = ctypes.c_uint(_TEXTURE_2D), ctypes.c_int(0)
+    made = function(context, flags, target, level, ctypes.c_uint(texture), ctypes.byref(error))
+    _check("clCreateFromGLTexture", error.value)
+    return cl.Image.from_int_ptr(made, retain=False)
 
 
-class _PyopenclCalls:
-    """By pyopencl, where it was built with OpenGL."""
-
-    _cl: Any = cl  # its stubs are of a build without
-
-    def texture(self, device: Device, texture: int) -> Any:
-        with device.failures("sharing a texture with OpenGL"):
-            flags = cl.mem_flags.WRITE_ONLY
-            return self._cl.GLTexture(device.context, flags, _TEXTURE_2D, 0, texture, 2)
-
-    def acquire(
-        self, device: Device, queue: cl.CommandQueue, image: cl.Image, wait_for: Sequence[cl.Event]
-    ) -> None:
-        with device.failures("taking a texture from OpenGL"):
-            self._cl.enqueue_acquire_gl_objects(queue, [image], wait_for=list(wait_for))
-
-    def release(self, device: Device, queue: cl.CommandQueue, image: cl.Image) -> None:
-        with device.failures("giving a texture back to OpenGL"):
-            self._cl.enqueue_release_gl_objects(queue, [image])
-
-
-def _calls() -> _LoaderCalls | _PyopenclCalls:
-    return _PyopenclCalls() if cl.have_gl() else _LoaderCalls()
+def _enqueue(
+    name: Literal["clEnqueueAcquireGLObjects", "clEnqueueReleaseGLObjects"],
+    queue: cl.CommandQueue,
+    image: cl.Image,
+    wait_for: Sequence[cl.Event] = (),
+) -> None:
+    images = (ctypes.c_void_p * 1)(image.int_ptr)
+    events = (ctypes.c_void_p * len(wait_for))(*(event.int_ptr for event in wait_for))
+    count = ctypes.c_uint(len(wait_for))
+    function = _function(name, ctypes.c_int)
+    target = ctypes.c_void_p(queue.int_ptr)
+    _check(name, function(target, ctypes.c_uint(1), images, count, events if wait_for else None, None))
 
 
 def _make_context(cl_device: cl.Device, properties: Properties) -> cl.Context:
-    """A context with properties that pyopencl refuses without OpenGL."""
+    """A context with properties that pyopencl refuses where it was built without OpenGL."""
     error = ctypes.c_int()
     devices = (ctypes.c_void_p * 1)(cl_device.int_ptr)
     function = _function("clCreateContext", ctypes.c_void_p)

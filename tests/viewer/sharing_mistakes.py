@@ -107,7 +107,7 @@ def _release_in_another_queue(real: Callable[..., Any], shared: Any, queue: Any)
 
 
 def _release_unfinished(real: Callable[..., Any], shared: Any, queue: Any) -> None:
-    gl_sharing._calls().release(shared.device, queue, shared.image)
+    gl_sharing._enqueue("clEnqueueReleaseGLObjects", queue, shared.image)
 
 
 def _release_and_wait_elsewhere(real: Callable[..., Any], shared: Any, queue: Any) -> None:
@@ -173,12 +173,12 @@ def _fence_too_early(window: Any) -> None:
 
 
 def _fence_forgotten(window: Any) -> None:
-    real = gl_sharing._LoaderCalls.acquire
+    real = gl_sharing._enqueue
 
-    def acquire(self: Any, device: Any, queue: Any, image: Any, wait_for: Any) -> None:
-        real(self, device, queue, image, ())
+    def enqueue(name: Any, queue: Any, image: Any, wait_for: Any = ()) -> None:
+        real(name, queue, image)
 
-    gl_sharing._LoaderCalls.acquire = acquire  # type: ignore[method-assign]
+    gl_sharing._enqueue = enqueue
 
 
 _SHARES = "does not share textures with OpenGL"
