@@ -8,9 +8,8 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-
-from clfractal.shading.glass import found_glass
-from clfractal.shading.scattering import found_albedos
+from tables_glass import found_glass
+from tables_layers import found_albedos
 
 TABLES = Path(__file__).resolve().parents[1] / "clfractal" / "tables"
 

@@ -43,11 +43,10 @@ from clfractal.integrators.waves import (
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.shading.environment import packed_map
-from clfractal.shading.glass import glass_tables
 from clfractal.shading.light_records import light_records, light_tables, tables_key
 from clfractal.shading.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
 from clfractal.shading.materials import PBR, pbr_text, scattering_defines
-from clfractal.shading.scattering import albedo_tables
+from clfractal.shading.scattering import albedo_tables, glass_tables
 from clfractal.shading.set_lights import set_light_data, set_lights_of
 
 PALETTE_SIZE = 256

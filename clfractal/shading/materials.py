@@ -9,14 +9,16 @@ from clfractal.scene.materials import PARTS, PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
 from clfractal.schema.mapped import Map
-from clfractal.shading.facets import AGAIN_TENTHS, EVEN_HUNDREDTHS, NARROWEST_TENTHS
-from clfractal.shading.glass import WAVELENGTHS
 from clfractal.shading.scattering import (
+    AGAIN_TENTHS,
     COSINES,
+    EVEN_HUNDREDTHS,
+    NARROWEST_TENTHS,
     REFLECTANCES,
     ROUGHNESSES,
     SMOOTHEST_FUZZ_PARTS,
     SMOOTHEST_PARTS,
+    WAVELENGTHS,
     albedo_tables,
 )
 

@@ -10,9 +10,8 @@ import numpy as np
 from clfractal.device.select import Device, choose
 from clfractal.device.structs import Precision
 from clfractal.scene.materials import PbrMaterial
-from clfractal.shading.glass import glass_tables
 from clfractal.shading.materials import PBR, material_values, pbr_text, scattering_defines
-from clfractal.shading.scattering import albedo_tables
+from clfractal.shading.scattering import albedo_tables, glass_tables
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 _TEXT = """\

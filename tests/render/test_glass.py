@@ -11,8 +11,7 @@ import pytest
 from scipy.stats import chi2
 
 from clfractal.scene.materials import PbrMaterial
-from clfractal.shading.glass import fresnel_across, wavelengths
-from clfractal.shading.spectrum import seen_colors
+from tests.makers import maker
 from tests.render.lobes import COSINES, numbers, toward
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.variants import one_of
@@ -150,7 +149,7 @@ def test_smooth_glass_follows_snell_and_fresnel(ior: float, inside: bool) -> Non
         expected = -viewer[0] / across + (cosine / across - other) * NORMAL
         assert np.abs(found.chosen[beyond].mean(axis=0) - expected).max() < 1e-3
         assert np.abs(found.chosen[beyond] - expected).mean() < 5e-3
-        reflected = fresnel_across(np.array([cosine]), across)[0]
+        reflected = maker("tables_glass").fresnel_across(np.array([cosine]), across)[0]
         assert abs(beyond.mean() - (1 - reflected)) < 2e-3
 
 
@@ -179,12 +178,12 @@ def test_lanes_do_not_matter(lanes: int, precision: Any) -> None:
 
 
 def test_wavelengths_are_white_together() -> None:
-    table = wavelengths()
+    table = maker("tables_glass").wavelengths()
     assert np.allclose(np.trapezoid(table[:, 1:], dx=1 / (len(table) - 1), axis=0), 1)
     assert (table[:, 1:] >= 0).all()
     # The index falls from blue to red; it is told from line d, in parts of the difference of lines F and C.
     assert (np.diff(table[:, 0]) < 0).all()
-    bend, colors = table[:, 0], seen_colors(np.array([450.0, 540.0, 620.0]))
+    bend, colors = table[:, 0], maker("tables_spectrum").seen_colors(np.array([450.0, 540.0, 620.0]))
     assert (colors.argmax(axis=1) == [2, 1, 0]).all()
     blue, green, red = (np.average(bend, weights=table[:, n]) for n in (3, 2, 1))
     assert red < 0.3

@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.shading.glass import found_glass, glass_tables
 from clfractal.shading.scattering import COSINES as COSINES_OF_TABLES
-from clfractal.shading.scattering import REFLECTANCES, ROUGHNESSES, albedo_tables, found_albedos, fresnel
-from clfractal.shading.spectrum import WAVES
+from clfractal.shading.scattering import REFLECTANCES, ROUGHNESSES, WAVES, albedo_tables, glass_tables
+from tests.makers import maker
 from tests.render.lobes import COSINES, LOBES, NO_GLOSS, Floats, hemisphere, material, numbers, toward
 from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
@@ -117,7 +116,7 @@ def test_a_mirror_reflects_what_fresnel_says() -> None:
         found = ask(material(values), viewers, viewers, places, precision="float64")
         kept = found.chosen_density > 0
         weights = found.chosen_value[kept, 0] / found.chosen_density[kept]
-        expected = fresnel(np.array([cosine]), 1.5)[0]
+        expected = maker("tables_layers").fresnel(np.array([cosine]), 1.5)[0]
         assert abs(weights.sum() / len(places) - expected) < 0.01 * expected + 1e-4
 
 
@@ -136,7 +135,9 @@ def test_colours_of_wavenumbers_are_white_together() -> None:
 
 def test_tables_that_travel_with_the_program_are_what_is_found() -> None:
     """But for what libraries of mathematics differ in."""
-    for kept, found in ((albedo_tables(), found_albedos()), (glass_tables(), found_glass())):
+    makers = maker("tables_layers").found_albedos, maker("tables_glass").found_glass
+    for kept, find in zip((albedo_tables(), glass_tables()), makers, strict=True):
+        found = find()
         assert kept.dtype == found.dtype
         assert kept.shape == found.shape
         assert np.abs(kept - found).max() < 1e-6

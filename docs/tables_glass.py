@@ -1,11 +1,6 @@
-"""Glass as paths read it: tables of what rough glass reflects and refracts in all, and of wavelengths.
+"""What rough glass reflects and refracts in all, and wavelengths, laid out as `clfractal/shading/scattering.py` says.
 
-They follow those of `scattering.py` in the buffer, and `elements/materials/transmission.h` and `glass_paths.h` of the
-kernels read them:
-
-    glass seen from outside   [REFLECTANCES][ROUGHNESSES][COSINES + 1]
-    glass seen from inside    [REFLECTANCES][ROUGHNESSES][COSINES + 1]
-    wavelengths               [WAVELENGTHS + 1][4]
+`elements/materials/transmission.h` and `glass_paths.h` of the kernels read them.
 
 The first two are albedos, without the light that is lost between facets; the root of the reflectance at normal incidence is
 (j / REFLECTANCES)^2, since light from inside changes most near an index of 1.
@@ -17,42 +12,22 @@ difference between 486.1 nm and 656.3 nm; and the weights of linear Rec. 709, wh
 
 from __future__ import annotations
 
-from functools import cache
-
 import numpy as np
+from tables_facets import shadow
+from tables_layers import Doubles, Floats, mean_albedo, mirrored, table_cosines, visible_normals
+from tables_spectrum import SEEN, seen_colors
 
 from clfractal.device.threads import in_threads
-from clfractal.shading.facets import shadow
-from clfractal.shading.scattering import (
-    COSINES,
-    REFLECTANCES,
-    ROUGHNESSES,
-    SMOOTHEST_PARTS,
-    Doubles,
-    Floats,
-    mean_albedo,
-    mirrored,
-    read_table,
-    table_cosines,
-    visible_normals,
-)
-from clfractal.shading.spectrum import SEEN, seen_colors
+from clfractal.shading.scattering import COSINES, REFLECTANCES, ROUGHNESSES, SMOOTHEST_PARTS, WAVELENGTHS
 
-WAVELENGTHS = 64
 LEAST_INDEX = 1.005
 """The index of refraction of glass, at the least: float32 cannot tell where light is bent to below it."""
 # Fraunhofer's lines d, F and C, by which Abbe numbers are told, in nanometres.
 _LINE_D, _LINE_F, _LINE_C = 587.6, 486.1, 656.3
 
 
-@cache
-def glass_tables() -> Floats:
-    """The buffer, float32, one-dimensional; it travels with the program."""
-    return read_table("glass")
-
-
 def found_glass() -> Floats:
-    """What `glass_tables` reads, by quadrature: 0.3 s."""
+    """What `scattering.glass_tables` reads: 0.3 s."""
     return np.concatenate([glass_albedos().reshape(-1), wavelengths().reshape(-1)]).astype(np.float32)
 
 

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.shading.scattering import WAVES
+
 Doubles = npt.NDArray[np.float64]
 
 SEEN = (380.0, 720.0)
-WAVES = 48
-"""Wavenumbers at which the light that a film reflects is known, from the longest wave to the shortest."""
 
 
 def seen_colors(nanometres: Doubles) -> Doubles:

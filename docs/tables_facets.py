@@ -21,14 +21,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.shading.scattering import EVEN_HUNDREDTHS, NARROWEST_TENTHS
+
 Doubles = npt.NDArray[np.float64]
 
-EVEN_HUNDREDTHS = 5
-"""The part of the lobe that knows no direction, hundredths of 1/sr, beside GGX."""
-NARROWEST_TENTHS = 1
-"""The least width of the lobe, tenths: narrower ones have next to no light."""
-AGAIN_TENTHS = 8
-"""Of light that has met three facets the part that meets a fourth, in parts of that which met a third of two, tenths."""
 # Of generators of lattices of so many points one whose sums are the nearest to those of 65536.
 _FACETS, _GENERATOR = 1021, 776
 _MIDDLES, _ANGLES = 64, 32
