@@ -135,7 +135,6 @@ def save_views(
     right: Picture,
     path: str | Path,
     *,
-    header: Mapping[str, Any] | None = None,
     half: Collection[str] | None = None,
 ) -> None:
     """Writes both eyes' pictures to one multi-view EXR, the left one as its default view; memory as of `save_outputs`.
@@ -146,7 +145,6 @@ def save_views(
 
     Args:
         left, right: pictures of one size and region with the same channels.
-        header: added to `left.header`.
         half: the channels that are stored as half, without views; by default as `CHANNELS` says.
 
     Raises:
@@ -185,7 +183,7 @@ def save_views(
         region=(region.x, region.y, region.width, region.height),
         channels=[in_view(name, view) for view in VIEWS for name in left.channels],
         half={in_view(name, view) for view in VIEWS for name in half},
-        header=_attributes({**common, **own, **(header or {}), "view": None, "multiView": VIEWS}),
+        header=_attributes({**common, **own, "view": None, "multiView": VIEWS}),
     )
 
 

@@ -29,10 +29,8 @@ def grid_from_dense(
     *,
     place: GridPlace,
     threshold: float | None = None,
-    opaque: float | None = None,
     normal_radius: int = 1,
     on_compile: Callable[[str], None] | None = None,
-    progress: Callable[[int, int], None] | None = None,
 ) -> Grid:
     """A grid of values that are given.
 
@@ -41,11 +39,10 @@ def grid_from_dense(
             becomes float32.
         device: where the grid shall be.
         place: where the voxels are; of the array's shape.
-        threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all.
-        opaque: least value that counts as inside (a normal's fourth byte); None: what is above `threshold`, or all.
+        threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all. What is
+            above it counts as inside (a normal's fourth byte), or all.
         normal_radius: of the low-pass filter before normals, voxels, 0 to 4.
         on_compile: told a line if the program has to be compiled first.
-        progress: told how many bricks are stored, of how many.
 
     Raises:
         ValueError: an array of another shape or type.
@@ -78,13 +75,11 @@ def grid_from_dense(
     parts = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
     built = programs.build_all(device, [build], on_compile)[0]
     pools = [allocate(device, parts, size, "the grid") for size in sizes]
-    slabs = _Slabs(device, place, values, built, opaque if opaque is not None else least, normal_radius)
+    slabs = _Slabs(device, place, values, built, least, normal_radius)
     milliseconds = 0.0
     z, y, x = np.nonzero(visible)
     for (first, after), value_part, normal_part in zip(parts.ranges(), *pools, strict=True):
         milliseconds += slabs.store(value_part, normal_part, x[first:after], y[first:after], z[first:after])
-        if progress is not None:
-            progress(after, stored)
     entries = empty_cubes(entries)
     table = upload(device, entries, "the grid's table", "storing the grid")
     stats = GridStats(
