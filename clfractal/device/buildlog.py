@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from clfractal.device.source import SourceMap, origin
@@ -37,10 +36,7 @@ class Diagnostic:
 
 def diagnostics(log: str) -> list[Diagnostic]:
     """The errors in a compiler's log, in the log's order, without warnings and notes."""
-    return list(_parse(log))
-
-
-def _parse(log: str) -> Iterator[Diagnostic]:
+    found = []
     for line in log.splitlines():
         for form in _FORMS:
             match = form.match(line.strip())
@@ -50,10 +46,10 @@ def _parse(log: str) -> Iterator[Diagnostic]:
             if not parts["kind"] and not line.strip().startswith("error: "):
                 continue
             column = parts.get("column")
-            yield Diagnostic(
-                parts["file"], int(parts["line"]), int(column) if column else None, parts["text"]
-            )
+            place = parts["file"], int(parts["line"]), int(column) if column else None
+            found.append(Diagnostic(*place, parts["text"]))
             break
+    return found
 
 
 def build_error(log: str, text: str, sources: SourceMap, device_name: str) -> KernelBuildError:

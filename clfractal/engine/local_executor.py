@@ -13,7 +13,7 @@ import pyopencl as cl
 from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
 from clfractal.device.select import Device, shown_size
-from clfractal.engine.drawing import SLOTS, TILE_PIXELS, Drawing, Outlet, OutputBuffers
+from clfractal.engine.drawing import SLOTS, TILE_PIXELS, Drawing, OutputBuffers
 from clfractal.engine.job import Job
 from clfractal.engine.run import Counters, Result, WorkItem
 from clfractal.engine.stages import Span
@@ -161,7 +161,12 @@ class LocalExecutor:
         *,
         last: bool = True,
     ) -> Generator[Result]:
-        """Renders tiles of a view; `places`: by their numbers, where they keep what one pass leaves for the next."""
+        """Launches an item's tiles and gives them as they are finished.
+
+        Args:
+            places: by tiles' numbers, where they keep what one pass leaves for the next.
+            last: else more of the item is to come, and only counts are given.
+        """
         drawing = self._drawing(item.view, view, len(item.tiles), token)
         if places is not None:
             drawing.keep(int(places.max()) + 1)
@@ -169,7 +174,31 @@ class LocalExecutor:
         # Of what devices share each takes only what its launches under way hold.
         group = pixels_at_a_time(self.device) // TILE_PIXELS if self.supply is None else 0
         cutter = _Cutter(drawing, item, take, places, group)
-        yield from _launched(cutter, self.budget_seconds, token, outlet=outlet, last=last)
+        pace = drawing.pace
+        pace.seconds = self.budget_seconds / IN_FLIGHT
+        pace.most = float(drawing.capacity * cutter.per_tile)
+        pace.begin()
+        counters = Counters(build_ms=drawing.build_ms)
+        launches = in_launches(
+            self.device, cutter.enqueue, pace, doing="rendering", token=token, watched=drawing.watched
+        )
+        with closing(launches):
+            for span, milliseconds in launches:
+                counters.kernel_ms += milliseconds
+                if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
+                    # Only a part of a tile is done: there is nothing to read yet.
+                    yield Result(item.view, _NO_TILES, _NO_PIXELS, counters)
+                elif outlet is not None and last:
+                    # Only now: a launch that was cancelled has left unfinished tiles.
+                    drawing.hand_over(span, outlet)
+                    yield Result(item.view, span.tiles, _NO_PIXELS, counters)
+                else:
+                    framebuffer, sums = drawing.collect(span)
+                    for name, count in zip(STATISTICS, sums, strict=True):
+                        setattr(counters, name, int(count))
+                    done = (span.tiles, framebuffer) if last else (_NO_TILES, _NO_PIXELS)
+                    yield Result(item.view, *done, counters)
+                counters = Counters()
 
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
         # Put back only when it is complete: one whose update failed is half of each view.
@@ -210,43 +239,6 @@ def _in_order(tiles: Tiles) -> Supply:
         return tiles[place - count : place]
 
     return take
-
-
-def _launched(
-    cutter: _Cutter,
-    budget_seconds: float,
-    token: CancelToken | None,
-    *,
-    outlet: Outlet | None,
-    last: bool,
-) -> Generator[Result]:
-    """Launches an item's tiles and gives them as they are finished; only their counts, if more of them is to come."""
-    drawing, item = cutter.drawing, cutter.item
-    pace = drawing.pace
-    pace.seconds = budget_seconds / IN_FLIGHT
-    pace.most = float(drawing.capacity * cutter.per_tile)
-    pace.begin()
-    counters = Counters(build_ms=drawing.build_ms)
-    launches = in_launches(
-        drawing.device, cutter.enqueue, pace, doing="rendering", token=token, watched=drawing.watched
-    )
-    with closing(launches):
-        for span, milliseconds in launches:
-            counters.kernel_ms += milliseconds
-            if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
-                # Only a part of a tile is done: there is nothing to read yet.
-                yield Result(item.view, _NO_TILES, _NO_PIXELS, counters)
-            elif outlet is not None and last:
-                # Only now: a launch that was cancelled has left unfinished tiles.
-                drawing.hand_over(span, outlet)
-                yield Result(item.view, span.tiles, _NO_PIXELS, counters)
-            else:
-                framebuffer, sums = drawing.collect(span)
-                for name, count in zip(STATISTICS, sums, strict=True):
-                    setattr(counters, name, int(count))
-                done = (span.tiles, framebuffer) if last else (_NO_TILES, _NO_PIXELS)
-                yield Result(item.view, *done, counters)
-            counters = Counters()
 
 
 class _Cutter:

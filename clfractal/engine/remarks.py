@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from clfractal.camera.views import View
 from clfractal.engine.job import Job
-from clfractal.engine.run import Progress
+from clfractal.engine.run import Counters, Progress
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
@@ -56,16 +56,13 @@ class _Seen:
     Attributes:
         views: of each eye.
         stores: their pictures.
-        rays, hits: camera rays, and those that found anything.
+        counts: sums of what their rays counted.
         empty: whether nothing is seen; None where that is not known.
     """
 
     views: tuple[PlannedView, ...]
     stores: tuple[Picture, ...]
-    rays: int
-    hits: int
-    steps: int
-    bad: int
+    counts: Counters
     empty: bool | None
 
     @property
@@ -127,19 +124,17 @@ def mixed_kinds(count: int) -> str:
 
 def _gathered(job: Job, state: Progress, stores: Sequence[Picture], number: int) -> _Seen:
     chosen = [place for place, view in enumerate(job.views) if view.number == number]
-    counts = [state.views[place] for place in chosen]
-    hits = sum(each.hits for each in counts)
-    empty: bool | None = hits == 0
+    counts = Counters()
+    for place in chosen:
+        counts.add(state.views[place])
+    empty: bool | None = counts.hits == 0
     if empty and state.tiles_before:
         shown = [_shows(stores[place]) for place in chosen]
         empty = None if None in shown else not any(shown)
     return _Seen(
         tuple(job.views[place] for place in chosen),
         tuple(stores[place] for place in chosen),
-        sum(each.rays for each in counts),
-        hits,
-        sum(each.steps for each in counts),
-        sum(each.bad_distances for each in counts),
+        counts,
         empty,
     )
 
@@ -157,11 +152,11 @@ def _of_view(seen: _Seen) -> list[str]:
         clear = ", so alpha is 0 everywhere" if seen.scene.background == "transparent" else ""
         return [why.replace(";", f"{clear};", 1)] if why else []
     found = [*_of_solid(seen), *_of_motion(seen), *_of_lighting(seen.scene)]
-    if isinstance(renderer, SurfaceRenderer) and seen.bad > BAD_SHARE * seen.steps:
+    if isinstance(renderer, SurfaceRenderer) and seen.counts.bad_distances > BAD_SHARE * seen.counts.steps:
         scale = renderer.step_scale if renderer.step_scale is not None else seen.scene.chain.step_scale
         found.append(
-            f"{seen.bad / seen.steps:.1%} of the steps ended inside the set, where it may have holes; a renderer.step_scale"
-            f" below {scale:.3g}, such as {scale / 2:.2g}, helps"
+            f"{seen.counts.bad_distances / seen.counts.steps:.1%} of the steps ended inside the set, where it may have"
+            f" holes; a renderer.step_scale below {scale:.3g}, such as {scale / 2:.2g}, helps"
         )
     return found
 
@@ -169,11 +164,11 @@ def _of_view(seen: _Seen) -> list[str]:
 def _of_steps(seen: _Seen) -> str:
     """That marches mostly take as many steps as they may, so that many end before they arrive; else empty."""
     scene, renderer = seen.scene, seen.scene.renderer
-    if not isinstance(renderer, SurfaceRenderer) or renderer.search == "steps" or not seen.steps:
+    if not isinstance(renderer, SurfaceRenderer) or renderer.search == "steps" or not seen.counts.steps:
         return ""
     center, radius = scene.bounds
     met = [_meets_ball(view.camera, np.array(center), radius).mean() for view in seen.views]
-    through = seen.rays * (float(np.mean(met)) if seen.whole else 1.0)
+    through = seen.counts.rays * (float(np.mean(met)) if seen.whole else 1.0)
     # Where a surface is hit others begin: as many as there can be, so that their steps do not look like those of rays.
     if isinstance(scene.lighting, PathLighting):
         each = 2 * scene.lighting.bounces
@@ -181,10 +176,10 @@ def _of_steps(seen: _Seen) -> str:
         occlusion = scene.surface.ambient_occlusion
         shadows = sum(light.rays or 1 for light in scene.lights if light.shadow)
         each = 1 + shadows + (occlusion.rays if occlusion is not None else 0)
-    marches = max(through + seen.hits * each, 1.0)
-    if seen.steps < _MUCH * marches * renderer.max_steps:
+    marches = max(through + seen.counts.hits * each, 1.0)
+    if seen.counts.steps < _MUCH * marches * renderer.max_steps:
         return ""
-    mean = min(seen.steps / marches, float(renderer.max_steps))
+    mean = min(seen.counts.steps / marches, float(renderer.max_steps))
     return (
         f"rays take {mean:.3g} of at most {renderer.max_steps} steps on the average, so many end before they"
         " arrive; a larger renderer.max_steps shows more"
@@ -236,7 +231,7 @@ def _of_motion(seen: _Seen) -> list[str]:
 def _why_no_surface(seen: _Seen) -> str:
     """Why no ray met the set; empty if that need not be a mistake."""
     center, radius = seen.scene.bounds
-    if not any(_sees_ball(view.camera, np.array(center), radius) for view in seen.views):
+    if not any(_meets_ball(view.camera, np.array(center), radius).any() for view in seen.views):
         return (
             f"no ray meets the set; its bounds, a ball of radius {radius:g} around {_point(center)}, are not in the"
             " picture: turn camera.target to them"
@@ -328,7 +323,7 @@ def _of_solid(seen: _Seen) -> list[str]:
     volume = renderer if isinstance(renderer, VolumeRenderer) else None
     if volume is not None and (scene.given is not None or volume.value == "iterations"):
         return []
-    if seen.hits == 0:
+    if seen.counts.hits == 0:
         return []
     what = "ball" if volume is None else "box"
     if all(inside_solid(scene, _rim(scene, volume), most=_MOST_APPLICATIONS)):
@@ -337,7 +332,7 @@ def _of_solid(seen: _Seen) -> list[str]:
             " a `shape` or larger bounds give it a form"
         ]
     # (Whoever is inside sees the set in every direction.)
-    if seen.hits < seen.rays or (volume is not None and volume.transfer.opacity is not None):
+    if seen.counts.hits < seen.counts.rays or (volume is not None and volume.transfer.opacity is not None):
         return []
     for view in seen.views:
         eye = view.camera.origin
@@ -422,10 +417,6 @@ def _rays(view: View, towards: Floats) -> tuple[Floats, Floats]:
     directions = places - view.eye
     directions /= np.linalg.norm(directions, axis=1, keepdims=True)
     return np.broadcast_to(view.eye, places.shape), directions
-
-
-def _sees_ball(view: View, center: Floats, radius: float) -> bool:
-    return bool(_meets_ball(view, center, radius).any())
 
 
 def _meets_ball(view: View, center: Floats, radius: float) -> npt.NDArray[np.bool_]:

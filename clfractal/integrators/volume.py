@@ -311,7 +311,7 @@ def grid_record(scene: Scene, grid: Grid, precision: Precision) -> npt.NDArray[A
     if scene.given is None:
         shown, _ = used_boxes(scene, settings_of(scene))
         # A resolution that does not divide the box evenly goes past it a little.
-        place = place.moved(shown.center, _zoom(scene))
+        place = place.moved(shown.center, settings_of(scene).magnification)
     values = {
         "corner": place.corner,
         **dict(zip(("own_x", "own_y", "own_z"), place.inverse, strict=True)),
@@ -331,11 +331,11 @@ def volume_record(
 ) -> npt.NDArray[Any]:
     """How rays go through the grid and how pixels are put together."""
     settings = settings_of(scene)
-    voxel = float(min(grid.spacing)) * _zoom(scene)
+    voxel = float(min(grid.spacing)) * settings.magnification
     zoom, origin = zoom_of(scene)
     # Paths count in sides of a voxel.
     step = voxel if has_paths(scene) else settings.step * voxel
-    longest = grid.place.diagonal * _zoom(scene)
+    longest = grid.place.diagonal * settings.magnification
     per_sample = (grid.range[1] - grid.range[0]) / full_sample(grid)
     low, high = ((value - grid.range[0]) / per_sample for value in value_range(scene, grid))
     least, most = grid.range if scene.given is None else (scene.given.low, scene.given.high)
@@ -481,11 +481,6 @@ def _formula_arguments(scene: Scene, precision: Precision) -> list[KernelArgumen
         return [np.zeros(1, np.float32), np.zeros(1, np.float32)]
     body = Body.of(scene)
     return [body.records(precision), body.constants(precision)]
-
-
-def _zoom(scene: Scene) -> float:
-    """Scene units of the picture per scene unit of what is filled."""
-    return settings_of(scene).magnification
 
 
 def _one_of(pools: Sequence[cl.Buffer], pool: int) -> cl.Buffer:

@@ -65,7 +65,8 @@ def grid_from_dense(
     least = (
         float(np.nextafter(np.float32(threshold), np.float32(np.inf))) if threshold is not None else -np.inf
     )
-    build, start = _Slabs.recipe(device, kind, normal_radius), time.perf_counter()
+    alone, start = programs.takes_parts(device), time.perf_counter()
+    recipe = programs.store_recipe("slab", kind, normal_radius, alone=alone)
     entries = np.full(visible.shape, -1, np.int32)
     stored = int(visible.sum())
     entries[visible] = np.arange(stored, dtype=np.int32)
@@ -73,7 +74,7 @@ def grid_from_dense(
     layer = nx * ny * sizes[0]
     others = 4 * entries.size + min(values.nbytes, max(SLAB_BYTES, 24 * layer))
     parts = plan_pools(device, stored, sizes, others, f"a grid of {nx} x {ny} x {nz} voxels")
-    built = programs.build_all(device, [build], on_compile)[0]
+    built = programs.build_all(device, [recipe], on_compile)[0]
     pools = [allocate(device, parts, size, "the grid") for size in sizes]
     slabs = _Slabs(device, place, values, built, least, normal_radius)
     milliseconds = 0.0
@@ -124,11 +125,6 @@ class _Slabs:
         self.kind: Kind = "byte" if values.dtype == np.uint8 else "float"
         self.built, self.opaque, self.reach = built, opaque, normal_radius + 1
         self.layers = max(SLAB_BYTES // (BRICK * values[0].nbytes) - 2, 1)
-
-    @staticmethod
-    def recipe(device: Device, kind: Kind, normal_radius: int) -> programs.Recipe:
-        alone = programs.takes_parts(device)
-        return programs.store_recipe("slab", kind, normal_radius, alone=alone)
 
     def store(
         self,
