@@ -20,7 +20,7 @@ from PIL import Image
 from clfractal.api import load_scene, render, render_pair
 from clfractal.files import resources
 from clfractal.images.compose import APART, Composed
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.scene.model import Scene
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer
@@ -82,7 +82,7 @@ def small_picture(path: Path) -> Picture:
     apart = scene.stereo.mode in APART
     stereo = scene.stereo.model_copy(update={"mode": "split"}) if apart else scene.stereo
     left, right = framebuffers
-    return Composed(stereo, (WIDTH, HEIGHT), left, right).to_framebuffer().to_rgb8(scene.output.stops)
+    return in_memory(Composed(stereo, (WIDTH, HEIGHT), left, right)).to_rgb8(scene.output.stops)
 
 
 def golden_path(path: Path) -> Path:

@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.images.develop import Development, developed
-from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.modes import BELOW, BESIDE, PICKED, eye_size, is_second, picture_size
 from clfractal.images.tiled import Bands, Floats, Picture
 from clfractal.images.tiles import Region
@@ -178,10 +177,6 @@ class Composed:
                 planes = compose(self.stereo, shown[0], shown[1], (self.region.x, row))
                 yield row, planes
                 row += len(planes[self.channels[0]])
-
-    def to_framebuffer(self) -> Framebuffer:
-        """All of it in memory."""
-        return in_memory(self)
 
 
 def agreed_header(headers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:

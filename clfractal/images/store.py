@@ -11,7 +11,6 @@ import numpy.typing as npt
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, check_channels
 from clfractal.files.journal import Journal
-from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.provenance import Provenance, RenderDevice
 from clfractal.images.tiled import Bands, Floats, check_tile
 from clfractal.images.tiles import TILE, Region, TileGrid
@@ -135,10 +134,6 @@ class JournalFramebuffer:
             found.known.append(RenderDevice(*(str(about.get(key, "")) for key in ("index", "name", "key"))))
         found.of_tiles[:] = self.journal.provenance
         return found
-
-    def to_framebuffer(self) -> Framebuffer:
-        """All of it in memory; missing tiles have their channels' fill values."""
-        return in_memory(self)
 
     def close(self) -> None:
         """Closes the journal and leaves it for a later run."""

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import SceneError
 from clfractal.images.compose import Composed, compose, composed_channels, eye_regions
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.modes import eye_size, picture_size
 from clfractal.images.tiles import Region
 from tests.render.eyes import CHANNELS, COMPOSED, PICKED, PLACED, eyes, filled, framebuffers, stereo
@@ -43,7 +43,7 @@ def test_modes_pixel_by_pixel(mode: str, swap: bool) -> None:
     image = (46, 38)
     planes = eyes(eye_size(scene, image))
     composed = Composed(scene, image, *framebuffers(scene, image, None, planes))
-    framebuffer = composed.to_framebuffer()
+    framebuffer = in_memory(composed)
     width, height = picture_size(scene, image)
     assert (framebuffer.width, framebuffer.height) == composed.display == (width, height)
     assert framebuffer.channels == CHANNELS
@@ -121,7 +121,7 @@ def test_a_region_is_the_same_part_of_the_whole(data: st.DataObject) -> None:
     x, y = data.draw(st.integers(0, width - 1)), data.draw(st.integers(0, height - 1))
     region = Region(x, y, data.draw(st.integers(1, width - x)), data.draw(st.integers(1, height - y)))
     planes = eyes(eye_size(scene, image))
-    whole = Composed(scene, image, *framebuffers(scene, image, None, planes)).to_framebuffer()
+    whole = in_memory(Composed(scene, image, *framebuffers(scene, image, None, planes)))
     part = Composed(scene, image, *framebuffers(scene, image, region, planes), region)
     assert (part.display, part.region) == ((width, height), region)
     row = region.y
@@ -213,12 +213,10 @@ def test_an_eye_alone_is_passed_on_as_it_is() -> None:
     shown = Composed(stereo("right", swap=True), (33, 34), None, framebuffer)
     assert shown.header.keys() == cameras.keys()
     for name in CHANNELS:
-        assert np.array_equal(shown.to_framebuffer()[name], right[name])
+        assert np.array_equal(in_memory(shown)[name], right[name])
     # The other eye's picture is not even looked at.
     other = filled(Framebuffer(CHANNELS, (33, 34)), left)
-    assert np.array_equal(
-        Composed(stereo("right"), (33, 34), other, framebuffer).to_framebuffer()["R"], right["R"]
-    )
+    assert np.array_equal(in_memory(Composed(stereo("right"), (33, 34), other, framebuffer))["R"], right["R"])
 
 
 def test_headers_tell_what_both_pictures_do() -> None:

@@ -16,7 +16,7 @@ from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
 from clfractal.images.compose import Composed, eye_regions
 from clfractal.images.formats import check_views
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.modes import eye_size
 from clfractal.images.outputs import pair_paths, save_outputs, save_views
 from clfractal.images.store import JournalFramebuffer
@@ -49,7 +49,7 @@ def test_files_from_disk_and_from_memory_are_the_same(tmp_path: Path, mode: str)
         save_outputs(composed, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
     for suffix in ("exr", "png"):
         assert (tmp_path / f"memory.{suffix}").read_bytes() == (tmp_path / f"disk.{suffix}").read_bytes()
-    whole = Composed(scene, image, memory[0], memory[1], region).to_framebuffer()
+    whole = in_memory(Composed(scene, image, memory[0], memory[1], region))
     found, attributes = read_exr(tmp_path / "disk.exr")
     assert sorted(found) == sorted(whole.channels)
     assert np.array_equal(found["R"], whole["R"].astype(np.float16))

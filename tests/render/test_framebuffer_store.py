@@ -18,7 +18,7 @@ from clfractal.files.exr_header import read_scene_text
 from clfractal.files.png import read_texts
 from clfractal.files.srgb import encode8
 from clfractal.images.formats import Content, check_output
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.outputs import save_outputs
 from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import TiledStore
@@ -68,7 +68,7 @@ def test_both_stores_hold_the_same_picture(tmp_path: Path, region: Region | None
     for name, plane in whole(memory).items():
         assert np.array_equal(plane, memory[name])
         assert np.array_equal(plane, whole(disk)[name])
-        assert np.array_equal(plane, disk.to_framebuffer()[name])
+        assert np.array_equal(plane, in_memory(disk)[name])
     assert np.isinf(memory["Z"]).sum() == 32 * 32
 
 
@@ -193,7 +193,7 @@ def test_full_disk_leaves_earlier_outputs(tmp_path: Path) -> None:
 MEMORY = """
 import resource, sys
 import numpy as np
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.outputs import save_outputs
 from clfractal.images.store import JournalFramebuffer
 

@@ -16,7 +16,7 @@ from clfractal.engine import drawing
 from clfractal.engine import local_executor as local
 from clfractal.engine.run import Progress
 from clfractal.engine.stages import Span
-from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.lanes import best_lanes
@@ -241,7 +241,7 @@ def test_interrupted_and_resumed(
     assert again.done.sum() == 5
     render_planned(scene, plan, device, again)
     assert again.done.all()
-    assert same(stacked(again.to_framebuffer()), wholes["hast"])
+    assert same(stacked(in_memory(again)), wholes["hast"])
     again.discard()
 
 
