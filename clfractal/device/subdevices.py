@@ -33,7 +33,7 @@ def divided(device: cl.Device, counts: tuple[int, ...], shown: str) -> list[cl.D
     """
     have, need = int(device.max_compute_units), sum(counts)
     if min(counts) < 1:
-        raise _refusal(f"{shown}: a part needs at least 1 compute unit, got {_sum(counts)}")
+        raise _refusal(f"{shown}: a part needs at least 1 compute unit, got {'+'.join(map(str, counts))}")
     if need > have:
         raise _refusal(f"{shown} has {have} compute units, but {need} are wanted")
     kind: Any = cl.device_partition_property.BY_COUNTS
@@ -45,10 +45,6 @@ def divided(device: cl.Device, counts: tuple[int, ...], shown: str) -> list[cl.D
         return list(device.create_sub_devices(wanted))
     except cl.Error as error:
         raise DeviceError(f"{shown}: the driver failed while dividing it", details=str(error)) from error
-
-
-def _sum(counts: tuple[int, ...]) -> str:
-    return "+".join(map(str, counts))
 
 
 def _refusal(message: str) -> DeviceError:

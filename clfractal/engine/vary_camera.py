@@ -91,25 +91,23 @@ def _move_camera(step: Step, camera: Camera, rng: Random, amount: float, locked:
         factor = math.exp(_DOLLY * dolly) if isinstance(camera, PerspectiveCamera) else 1.0
         orbited = _orbited(away, camera.up, _ROUND * turns, _RISE * rises)
         fine = 0.02 * distance
-        step.changes["camera.position"] = [
-            rounded(t + factor * a, fine) for t, a in zip(camera.target, orbited, strict=True)
+        place = [rounded(t + factor * a, fine) for t, a in zip(camera.target, orbited, strict=True)]
+        remarks = [
+            f"{abs(_ROUND * turns):.0f}° to the {'right' if turns > 0 else 'left'}",
+            f"{abs(_RISE * rises):.0f}° {'higher' if rises > 0 else 'lower'}",
         ]
-        step.sizes |= {"camera.round": turns, "camera.rise": rises, "camera.dolly": dolly}
-        step.remarks.append(f"{abs(_ROUND * turns):.0f}° to the {'right' if turns > 0 else 'left'}")
-        step.remarks.append(f"{abs(_RISE * rises):.0f}° {'higher' if rises > 0 else 'lower'}")
+        sizes = {"camera.round": turns, "camera.rise": rises, "camera.dolly": dolly}
+        step.add(Step({"camera.position": place}, sizes, remarks))
         if isinstance(camera, PerspectiveCamera) and camera.focus_distance is not None:
             step.changes["camera.focus_distance"] = rounded(factor * camera.focus_distance, fine)
     if isinstance(camera, PerspectiveCamera) and not is_locked("camera.fov", locked):
         wide = camera.fov * math.exp(_ANGLE * angle)
         wide = min(max(wide, min(_NARROWEST, camera.fov)), max(_WIDEST, camera.fov))
-        step.changes["camera.fov"] = rounded(wide, camera.fov * 0.05)
-        step.sizes["camera.fov"] = angle
-        step.remarks.append("wider" if angle > 0 else "narrower")
+        wide = rounded(wide, camera.fov * 0.05)
+        step.add(Step({"camera.fov": wide}, {"camera.fov": angle}, ["wider" if angle > 0 else "narrower"]))
     elif isinstance(camera, OrthographicCamera) and not is_locked("camera.height", locked):
-        step.changes["camera.height"] = rounded(
-            camera.height * math.exp(_DOLLY * dolly), camera.height * 0.05
-        )
-        step.sizes["camera.dolly"] = dolly
+        height = rounded(camera.height * math.exp(_DOLLY * dolly), camera.height * 0.05)
+        step.add(Step({"camera.height": height}, {"camera.dolly": dolly}))
 
 
 def _nearer(size: float) -> float:
@@ -152,13 +150,10 @@ def _move_plane(step: Step, renderer: CutPlaneRenderer, rng: Random, amount: flo
         "width": rounded(place.width, fine),
         "height": rounded(place.height, fine),
     }
-    step.changes["renderer.plane"] = plane
     names = ("tilt", "twist", "zoom", "side", "up", "normal")
-    sizes = (tilt, twist, zoom, side, up, normal)
-    step.sizes |= {f"plane.{name}": each for name, each in zip(names, sizes, strict=True)}
-    step.remarks.append(
-        f"plane {1 / factor:.2g}x, tilted {abs(_TILT * tilt):.0f}° and {abs(_TILT * twist):.0f}°"
-    )
+    sizes = dict(zip(names, (tilt, twist, zoom, side, up, normal), strict=True))
+    remark = f"plane {1 / factor:.2g}x, tilted {abs(_TILT * tilt):.0f}° and {abs(_TILT * twist):.0f}°"
+    step.add(Step({"renderer.plane": plane}, {f"plane.{name}": sizes[name] for name in names}, [remark]))
 
 
 def _half_height(camera: Camera) -> float:

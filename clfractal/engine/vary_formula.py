@@ -123,9 +123,7 @@ def _move_parameter(
     if new == value:
         return
     path = f"{slot.path}.parameters.{parameter.name}"
-    step.changes[path] = new
-    step.sizes[path] = size
-    step.remarks.append(f"{parameter.name} {new:.4g}")
+    step.add(Step({path: new}, {path: size}, [f"{parameter.name} {new:.4g}"]))
 
 
 def moved_value(parameter: Parameter, value: float, size: float) -> float:
@@ -176,7 +174,5 @@ def _move_julia(step: Step, path: str, constant: tuple[float, ...], rng: Random,
     length = math.hypot(*direction) or 1.0
     far = _JULIA * size * max(math.hypot(*constant), _LEAST_JULIA) / length
     moved = [rounded(c + far * d, far) for c, d in zip(constant, direction, strict=True)]
-    step.changes[path] = moved
-    for index, each in enumerate(direction):
-        step.sizes[f"{path}.{index}"] = size * each / length
-    step.remarks.append("julia " + ", ".join(f"{each:.3g}" for each in moved))
+    sizes = {f"{path}.{index}": size * each / length for index, each in enumerate(direction)}
+    step.add(Step({path: moved}, sizes, ["julia " + ", ".join(f"{each:.3g}" for each in moved)]))
