@@ -112,7 +112,11 @@ class Shutter:
 
     def _pose(self, time: float) -> _Pose:
         scene, eye = self.seen(time)
-        return _Pose.of(scene_view(scene, eye), scene.image.height)
+        view = scene_view(scene, eye)
+        across, up = view.side * view.width / 2, view.up * view.height / 2
+        corners = [view.center + x * across + y * up for x in (-1, 1) for y in (-1, 1)]
+        lens = (view.lens_radius, view.focus_distance if view.lens_radius > 0 else 0.0)
+        return _Pose(view, np.stack([view.origin, *corners]), lens, view.pixel_size(scene.image.height))
 
 
 @dataclass(frozen=True, slots=True)
@@ -130,13 +134,6 @@ class _Pose:
     points: Floats
     lens: tuple[float, float]
     pixel: float
-
-    @staticmethod
-    def of(view: View, height: int) -> _Pose:
-        across, up = view.side * view.width / 2, view.up * view.height / 2
-        corners = [view.center + x * across + y * up for x in (-1, 1) for y in (-1, 1)]
-        lens = (view.lens_radius, view.focus_distance if view.lens_radius > 0 else 0.0)
-        return _Pose(view, np.stack([view.origin, *corners]), lens, view.pixel_size(height))
 
 
 def shutter_of(scene: Scene, side: EyeName | None, number: int) -> Shutter | None:
