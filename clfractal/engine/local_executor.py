@@ -7,7 +7,6 @@ from contextlib import closing
 from functools import partial as partial_of
 
 import numpy as np
-import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
@@ -15,21 +14,17 @@ from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
 from clfractal.device.select import Device, shown_size
 from clfractal.engine.drawing import SLOTS, TILE_PIXELS, Drawing, OutputBuffers
 from clfractal.engine.job import Job
-from clfractal.engine.run import Counters, Result, WorkItem
+from clfractal.engine.run import NO_PIXELS, NO_TILES, Counters, Result, Tiles, WorkItem
 from clfractal.engine.stages import Span
-from clfractal.images.tiles import TILE, TileGrid
+from clfractal.images.tiles import TileGrid
 from clfractal.integrators.kept import Kept, Resources
 from clfractal.integrators.passes import PASS_ADD, PASS_KEEP, STATISTICS
 from clfractal.integrators.plan import PlannedView
 
-Tiles = npt.NDArray[np.int32]
 ViewOutlet = Callable[[int, cl.Buffer, cl.Buffer, int], None]
 """An `Outlet` for several views: the view's number, then as there."""
 Supply = Callable[[int], Tiles]
 """Gives the tiles of a launch, at most so many; none if there are no more."""
-
-_NO_TILES = np.zeros(0, np.int32)
-_NO_PIXELS = np.zeros((0, 0, TILE, TILE), np.float32)
 
 # Device memory for what samples of scenes of their own keep for the next one, unless a picture is made in passes.
 _KEPT_BETWEEN_SAMPLES = 256 << 20
@@ -187,16 +182,16 @@ class LocalExecutor:
                 counters.kernel_ms += milliseconds
                 if span.packets[1] < drawing.packets or span.samples[1] < item.samples[1]:
                     # Only a part of a tile is done: there is nothing to read yet.
-                    yield Result(item.view, _NO_TILES, _NO_PIXELS, counters)
+                    yield Result(item.view, NO_TILES, NO_PIXELS, counters)
                 elif outlet is not None and last:
                     # Only now: a launch that was cancelled has left unfinished tiles.
                     drawing.hand_over(span, outlet)
-                    yield Result(item.view, span.tiles, _NO_PIXELS, counters)
+                    yield Result(item.view, span.tiles, NO_PIXELS, counters)
                 else:
                     framebuffer, sums = drawing.collect(span)
                     for name, count in zip(STATISTICS, sums, strict=True):
                         setattr(counters, name, int(count))
-                    done = (span.tiles, framebuffer) if last else (_NO_TILES, _NO_PIXELS)
+                    done = (span.tiles, framebuffer) if last else (NO_TILES, NO_PIXELS)
                     yield Result(item.view, *done, counters)
                 counters = Counters()
 
@@ -261,7 +256,7 @@ class _Cutter:
         self.most = min(group, drawing.capacity)
         self.slot = 0
         # Tiles that are rendered in parts: their numbers, packets and next sample; no packets between two of them.
-        self.tiles = _NO_TILES
+        self.tiles = NO_TILES
         self.packets = (0, 0)
         self.sample = self.first
 

@@ -18,9 +18,13 @@ from clfractal.device.cancel import CancelToken
 from clfractal.engine.job import Job
 from clfractal.images.provenance import RenderDevice
 from clfractal.images.tiled import TiledStore
+from clfractal.images.tiles import TILE
 
 Floats = npt.NDArray[np.float32]
 Tiles = npt.NDArray[np.int32]
+
+NO_TILES = np.zeros(0, np.int32)
+NO_PIXELS = np.zeros((0, 0, TILE, TILE), np.float32)
 
 
 @dataclass(frozen=True, slots=True)

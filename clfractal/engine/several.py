@@ -18,16 +18,14 @@ from clfractal.engine.device_workers import DeviceWorkers
 from clfractal.engine.job import Job, Kind
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import lanes_of, pays_to_measure
-from clfractal.engine.run import Counters, Result, WorkItem
+from clfractal.engine.run import NO_PIXELS, NO_TILES, Counters, Result, WorkItem
 from clfractal.engine.sharing import Offer, Shared
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.images.provenance import RenderDevice
-from clfractal.images.tiles import TILE, TileGrid
+from clfractal.images.tiles import TileGrid
 
 # For so long a finished picture waits for programs that are being compiled for the next one, seconds.
 _LONGEST_BUILD = 600.0
-_NO_TILES = np.zeros(0, np.int32)
-_NO_PIXELS = np.zeros((0, 0, TILE, TILE), np.float32)
 
 
 class SeveralExecutor:
@@ -303,7 +301,7 @@ def _silent(device: Device, seconds: float) -> DeviceError:
 
 
 def _remark(line: str) -> Result:
-    return Result(0, _NO_TILES, _NO_PIXELS, Counters(), remark=line)
+    return Result(0, NO_TILES, NO_PIXELS, Counters(), remark=line)
 
 
 def _is_of_text(error: DeviceError | KernelBuildError) -> bool:

@@ -15,11 +15,8 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
-from clfractal.engine.run import WorkItem
-
-Tiles = npt.NDArray[np.int32]
+from clfractal.engine.run import NO_TILES, Tiles, WorkItem
 
 # A device that waits looks again after this time whether it should take tiles: others may be late.
 _LOOK_SECONDS = 0.02
@@ -30,7 +27,6 @@ _SMALLEST = 0.125
 # A device is taken for hung after so many times the seconds that its launches should take, and never earlier than this.
 _TIMES_LATE = 20.0
 _SHORTEST_PATIENCE = 30.0
-_NO_TILES = np.zeros(0, np.int32)
 
 
 @dataclass(slots=True, eq=False)
@@ -56,7 +52,7 @@ class Offer:
                 part = part[:missing]
             found.append(part)
             missing -= len(part)
-        return np.concatenate(found) if found else _NO_TILES
+        return np.concatenate(found) if found else NO_TILES
 
 
 @dataclass(slots=True)
@@ -131,7 +127,7 @@ class Shared:
             if worker.began is None:
                 worker.began = worker.last = now
             if self._stopped or worker.lost or worker.offer is None:
-                return _NO_TILES
+                return NO_TILES
             tiles = worker.offer.take(self._allowed(device, worker.offer, most, now))
             if len(tiles):
                 if not worker.flying:
