@@ -1,4 +1,5 @@
-"""The programs docs/make_*.py, for tests. They belong to no package, and import each other by name as when they are run."""
+"""The programs docs/make_*.py and docs/tables_*.py, for tests. They belong to no package, and import each other by name as
+when they are run."""
 
 from __future__ import annotations
 
