@@ -204,84 +204,72 @@ def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterat
 
 
 def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[Stage]:
-    marching = march_kernels(scene, plan)
+    marching, last = march_kernels(scene, plan), bounces(scene)
     points, after = scene.surface.used_points.count, light_turns(scene)
-    steps = scene.surface.search == "steps"
+    paths, faces = isinstance(scene.lighting, PathLighting), has_faces(scene)
 
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
         return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
 
-    beside = meets_objects(scene)
-    met, looked = (("meet_objects",), ("look_at_objects",)) if beside else ((), ())
+    def when(wanted: object, *stages: Stage) -> tuple[Stage, ...]:
+        return stages if wanted else ()
 
-    def of_objects(kernels: tuple[str, ...], turns: int) -> Iterator[Stage]:
-        return (Stage(kernel, OVER[kernel], turns) for kernel in kernels)
+    def objects(kernel: str, turns: int) -> tuple[Stage, ...]:
+        """What stands beside the set, where there is anything."""
+        return when(meets_objects(scene), Stage(kernel, OVER[kernel], turns))
 
     yield stage("begin_samples", int(cones))
-    for bounce in range(bounces(scene) + 1):
-        turns = 1
+    for bounce in range(last + 1):
         within = bounce > 0 and has_glass_set(scene)
+        of_points = points > 1 and bounce == 0
+        turns = points if of_points else 1
         # (Of a pixel with points only a face asks whether an object is before it.)
-        if points == 1 or bounce > 0 or has_faces(scene):
-            yield from of_objects(met, 1 + within)
-        if has_faces(scene):
-            yield stage("find_faces", bounce=bounce)
-        if points > 1 and bounce == 0:
+        yield from when(faces or not of_points, *objects("meet_objects", 1 + within))
+        yield from when(faces, stage("find_faces", bounce=bounce))
+        if of_points:
             yield from _marched(marching, 1, GOAL_TOUCH)
-            turns = points
             yield stage("send_points", 1)
-            yield from of_objects(met, turns)
-            yield from _marched(marching, turns, GOAL_POINT if steps else GOAL_SURFACE)
+            yield from objects("meet_objects", turns)
+            yield from _marched(
+                marching, turns, GOAL_POINT if scene.surface.search == "steps" else GOAL_SURFACE
+            )
         else:
             yield from _marched(marching, 1, GOAL_SURFACE)
             if within:
                 yield from _marched(inside_kernels(scene, plan), 1, GOAL_SURFACE, bounce)
-        yield from of_objects(looked, turns + within)
-        kernel = "join_points" if points > 1 and bounce == 0 else "find_interactions"
+        yield from objects("look_at_objects", turns + within)
+        kernel = "join_points" if of_points else "find_interactions"
         yield stage(kernel, turns, bounce=bounce, next_turns=after)
-        if has_wide_lights(scene):
-            yield stage("send_to_lights", bounce=bounce, next_turns=after)
-        air, paths = air_turns(scene) if bounce == 0 else 0, isinstance(scene.lighting, PathLighting)
-        if air > 0:  # behind the rays for light
-            yield stage("send_air", next_turns=1 if paths else after)
-        if asks_formula(scene):
-            yield stage("color_interactions", bounce=bounce)
-        if scene.cut_planes and bounce == 0 and not paths:
-            yield stage("find_planes")
-        if scene.glow is not None:
-            yield stage("add_glow", bounce=bounce)
+        yield from when(has_wide_lights(scene), stage("send_to_lights", bounce=bounce, next_turns=after))
+        air = air_turns(scene) if bounce == 0 else 0
+        # Behind the rays for light.
+        yield from when(air, stage("send_air", next_turns=1 if paths else after))
+        yield from when(asks_formula(scene), stage("color_interactions", bounce=bounce))
+        yield from when(scene.cut_planes and bounce == 0 and not paths, stage("find_planes"))
+        yield from when(scene.glow is not None, stage("add_glow", bounce=bounce))
         if paths:
-            if has_media(scene):
-                yield stage("cross_media", 1, bounce=bounce)
-            if finds_materials(scene):
-                yield stage("find_materials", bounce=bounce)
+            yield from when(has_media(scene), stage("cross_media", 1, bounce=bounce))
+            yield from when(finds_materials(scene), stage("find_materials", bounce=bounce))
             yield stage("scatter_costly" if has_costly(scene) else "scatter_paths", 1, bounce=bounce)
-            if clouds_of(scene):
-                yield stage("pass_clouds", bounce=bounce)
-            if scene.cut_planes and bounce == 0:
-                yield stage("find_planes")
-            yield from of_objects(met, 1 + air)
+            yield from when(clouds_of(scene), stage("pass_clouds", bounce=bounce))
+            yield from when(scene.cut_planes and bounce == 0, stage("find_planes"))
+            yield from objects("meet_objects", 1 + air)
             yield from _marched(marching, 1 + air, GOAL_SHADOW)
-            if air > 0:
-                yield stage("gather_air", 1 + air, next_turns=1)
+            yield from when(air, stage("gather_air", 1 + air, next_turns=1))
             yield stage("gather_paths", 1 + air, bounce=bounce)
             continue
         if after + air > 0:
-            yield from of_objects(met, after + air)
+            yield from objects("meet_objects", after + air)
             yield from _marched(marching, after + air, GOAL_SHADOW)
-        if air > 0:
-            yield stage("gather_air", after + air, next_turns=after)
-        if meets_lights(scene):
-            yield stage("meet_lights", bounce=bounce)
-        if has_wide_lights(scene):
-            yield stage("gather_light", after + air, bounce=bounce)
+        yield from when(air, stage("gather_air", after + air, next_turns=after))
+        yield from when(meets_lights(scene), stage("meet_lights", bounce=bounce))
+        yield from when(has_wide_lights(scene), stage("gather_light", after + air, bounce=bounce))
         yield stage("light_interactions", after + air, bounce=bounce)
-    if isinstance(scene.lighting, PathLighting):
-        yield from of_objects(met, 1)
+    if paths:
+        yield from objects("meet_objects", 1)
         yield from _marched(marching, 1, GOAL_SHADOW)
-        if has_media(scene):
-            yield stage("cross_media", 1, bounce=bounces(scene) + 1)
-        yield stage("end_paths", 1, bounce=bounces(scene) + 1)
+        yield from when(has_media(scene), stage("cross_media", 1, bounce=last + 1))
+        yield stage("end_paths", 1, bounce=last + 1)
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
