@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
@@ -18,12 +18,21 @@ from clfractal.device.launch import Pace
 from clfractal.device.select import Device, is_simulator
 from clfractal.device.threads import ending_together
 from clfractal.device.watched import Watched, is_watched
-from clfractal.engine.stages import CAPACITY, Span, Stages, Wave, group_of, number_count, wave_of
+from clfractal.engine.stages import CAPACITY, Span, Wave, group_of, number_count, wave_of
 from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.kept import Resources
-from clfractal.integrators.kernel import KernelArgument, ProgramText, TileKernel
+from clfractal.integrators.kernel import (
+    BLOCK,
+    STAGE_NUMBERS,
+    STATE_PADDING,
+    KernelArgument,
+    ProgramText,
+    Stage,
+    TileKernel,
+)
 from clfractal.integrators.passes import STATISTICS, kept_numbers
 from clfractal.integrators.plan import PlannedView
+from clfractal.integrators.waves import rays_of_item
 from clfractal.shading.cryptomatte import told
 
 TILE_PIXELS = TILE * TILE
@@ -113,7 +122,8 @@ class Drawing:
         self.build_ms = 0.0
         self.pace = Pace(1.0)
         self._kernels: Lease | None = None
-        self._stages: Stages | None = None
+        self._kernel: TileKernel | None = None
+        self._stages: dict[tuple[int, int], list[Stage]] = {}
         self._programs: list[program.Program] = []
         self._texts: list[ProgramText] = []
         self._flags: tuple[str, ...] = ()
@@ -164,7 +174,7 @@ class Drawing:
         if other or self._kernels is None:
             named = [(made, text.kernels) for text, made in zip(self._texts, built, strict=True)]
             self._kernels = Lease(self.device, named, 2 + number_count(kernel))
-        self._stages = Stages(self.device, kernel, self.wave, self.group, self._kernels)
+        self._kernel, self._stages = kernel, {}
 
     def wanted(self, view: PlannedView, resources: Resources) -> list[Wanted]:
         """The programs of all stages that pictures of the view's formula may have; nothing is built. Not for volumes."""
@@ -210,9 +220,13 @@ class Drawing:
 
     def start(self, span: Span) -> tuple[cl.Event, cl.Event]:
         """Enqueues a launch: its first kernel's event, and its last one's; its results are there when that is complete."""
-        assert self.view is not None
-        assert self._stages is not None
-        grid = TileGrid(self.view.plan.region)
+        kernel, kernels = self._kernel, self._kernels
+        assert kernel is not None
+        assert kernels is not None
+        if span.samples not in self._stages:
+            self._stages[span.samples] = list(kernel.stages(span.samples))
+        most = max(self.wave.packets // self.packets, 1)
+        grid = TileGrid(kernel.plan.region)
         places = np.zeros((len(span.tiles), 4), np.int32)
         places[:, 0] = (grid.first_column + span.tiles % grid.columns) * TILE
         places[:, 1] = (grid.first_row + span.tiles // grid.columns) * TILE
@@ -227,9 +241,16 @@ class Drawing:
             kept = self._kept if self._kept is not None else own.places  # a stand-in: nobody reads it
             buffers = [own.framebuffer, kept, own.statistics, own.places, *self._buffers[:-1]]
             buffers += [*self.outputs.wave[: len(self.wave.sizes)], self._buffers[-1]]
-            events = self._stages.enqueue(span, [*buffers, len(self.view.plan.channels), self._kept_count])
+            arguments = [*buffers, len(kernel.plan.channels), self._kept_count]
+            events = [
+                self._enqueue(
+                    kernel, kernels, stage, span, range(first, min(first + most, len(span.tiles))), arguments
+                )
+                for first in range(0, len(span.tiles), most)
+                for stage in self._stages[span.samples]
+            ]
             self.device.queue.flush()
-        return events
+        return events[0], events[-1]
 
     def hand_over(self, span: Span, outlet: Outlet) -> None:
         """Lets an outlet take the tiles of a launch that has ended, before the launch's buffers are used again."""
@@ -252,6 +273,40 @@ class Drawing:
             found[head:].view(np.float32).reshape(shape), self.view.plan.channels, self.view.scene
         )
         return framebuffer, sums
+
+    def _enqueue(
+        self,
+        of: TileKernel,
+        kernels: Lease,
+        stage: Stage,
+        span: Span,
+        tiles: range,
+        arguments: Sequence[Any],
+    ) -> cl.Event:
+        """Enqueues the kernel of a stage for some of a launch's tiles, one wave of them.
+
+        Args:
+            arguments: of every kernel, up to the numbers of the launch.
+        """
+        lanes, (first, end) = of.plan.lanes, span.packets
+        kernel = kernels.kernel(stage.kernel)
+        group = kernels.group(stage.kernel, group_of(stage.over, lanes, self.group))
+        numbers = [first, end, *span.samples, span.mode]
+        size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
+        if of.waves:
+            sent_by = wave = (end - first) * len(tiles) * lanes
+            if stage.of == "blocks":
+                packets = BLOCK * BLOCK // lanes
+                sent_by = ((end - 1) // packets - first // packets + 1) * len(tiles)
+            rays = sent_by * stage.turns
+            share = rays_of_item(lanes, rays, self.device.info.compute_units)
+            numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
+            numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
+            if stage.over != "pixels":
+                each = group[0] * (share if stage.over == "rays" else lanes)
+                size = (-(-rays // each) * group[0],)
+        kernel.set_args(*arguments, *numbers)
+        return cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
 
     def _divide(self, kernel: TileKernel, tiles: int) -> None:
         """Into packets, groups and waves."""

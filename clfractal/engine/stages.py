@@ -1,28 +1,16 @@
-"""How a launch takes its pixels from stage to stage: in waves, through the kernels of a view."""
+"""What a launch renders, and the waves in which its pixels go from stage to stage."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import pyopencl as cl
 
-from clfractal.device.kernels import Lease
 from clfractal.device.select import Device
 from clfractal.images.tiles import TILE
-from clfractal.integrators.kernel import (
-    BLOCK,
-    STAGE_NUMBERS,
-    STATE_PADDING,
-    WAVE_NUMBERS,
-    Over,
-    Stage,
-    TileKernel,
-)
-from clfractal.integrators.waves import rays_group, rays_of_item
+from clfractal.integrators.kernel import STAGE_NUMBERS, STATE_PADDING, WAVE_NUMBERS, Over, TileKernel
+from clfractal.integrators.waves import rays_group
 
 # Tiles of the largest launch: 1024 of them are a megapixel.
 CAPACITY = 512
@@ -94,55 +82,3 @@ def group_of(over: Over, lanes: int, group: int) -> tuple[int, ...]:
     if over == "rays":
         return rays_group(lanes)
     return (group, 1) if over == "pixels" else (group,)
-
-
-class Stages:
-    """The kernels of a view, ready to be launched."""
-
-    def __init__(self, device: Device, kernel: TileKernel, wave: Wave, group: int, kernels: Lease) -> None:
-        self.device, self.kernel, self.wave, self.group = device, kernel, wave, group
-        self._kernels = kernels
-        self._stages: dict[tuple[int, int], list[Stage]] = {}
-
-    def enqueue(self, span: Span, arguments: Sequence[Any]) -> tuple[cl.Event, cl.Event]:
-        """Enqueues all kernels of a launch; gives the first one's event and the last one's.
-
-        Args:
-            span: what is rendered.
-            arguments: of every kernel, up to the numbers of the launch.
-        """
-        if span.samples not in self._stages:
-            self._stages[span.samples] = list(self.kernel.stages(span.samples))
-        per_tile = TILE * TILE // self.kernel.plan.lanes
-        most = max(self.wave.packets // per_tile, 1)
-        events = [
-            self._enqueue(stage, span, range(first, min(first + most, len(span.tiles))), arguments)
-            for first in range(0, len(span.tiles), most)
-            for stage in self._stages[span.samples]
-        ]
-        return events[0], events[-1]
-
-    def _enqueue(self, stage: Stage, span: Span, tiles: range, arguments: Sequence[Any]) -> cl.Event:
-        lanes, (first, end) = self.kernel.plan.lanes, span.packets
-        kernel = self._kernels.kernel(stage.kernel)
-        group = self._kernels.group(stage.kernel, group_of(stage.over, lanes, self.group))
-        numbers = [first, end, *span.samples, span.mode]
-        size: tuple[int, ...] = (-(-(end - first) // self.group) * self.group, len(tiles))
-        if self.kernel.waves:
-            wave = (end - first) * len(tiles) * lanes
-            sent_by = self._blocks(span, len(tiles)) if stage.of == "blocks" else wave
-            rays = sent_by * stage.turns
-            share = rays_of_item(lanes, rays, self.device.info.compute_units)
-            numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
-            numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
-            if stage.over != "pixels":
-                each = group[0] * (share if stage.over == "rays" else lanes)
-                size = (-(-rays // each) * group[0],)
-        kernel.set_args(*arguments, *numbers)
-        return cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
-
-    def _blocks(self, span: Span, tiles: int) -> int:
-        """Blocks of pixels of which the launch has any."""
-        packets = BLOCK * BLOCK // self.kernel.plan.lanes
-        first, end = span.packets
-        return ((end - 1) // packets - first // packets + 1) * tiles
