@@ -78,7 +78,11 @@ def lane_reports(
             if on_start is not None:
                 on_start(f"measuring {device.info.name}, once")
                 on_start = None
-            report, is_known = _try(device, precision, lanes, stopped)
+            doing = f"trying {lanes} lanes"
+            answer, is_known = tried(
+                PROBE, device, precision, lanes, doing=doing, timeout_s=PROBE_TIMEOUT_S, stopped=stopped
+            )
+            report = LaneReport(lanes, str(answer["fault"]))
             if is_known:
                 name = name_of(device, precision, lanes, PROBE, _VERSION)
                 cache.remember(SECTION, name, asdict(report))
@@ -147,25 +151,33 @@ def is_of_the_device(error: ClfractalError) -> bool:
     return error.status == STATUS_DEVICE_FAILED and not isinstance(error, UntriedError)
 
 
-def _try(
-    device: Device, precision: Precision, lanes: int, stopped: Callable[[], bool] | None
-) -> tuple[LaneReport, bool]:
-    """The report, and whether it may be remembered."""
+def tried(
+    job: str,
+    device: Device,
+    precision: Precision,
+    lanes: int,
+    *,
+    doing: str,
+    timeout_s: float,
+    stopped: Callable[[], bool] | None,
+) -> tuple[dict[str, Any], bool]:
+    """What a job in a child process answers about a lane count, or its `fault`; and whether that may be remembered.
+
+    Args:
+        doing, timeout_s, stopped: as of `isolate.run`.
+
+    Raises:
+        FileError: there is no room for what the driver writes.
+        Stopped: `stopped` answered True.
+    """
+    request = {"lanes": lanes, "precision": precision}
     try:
         with activity.doing(f"measuring {device.info.name}"):
-            answer = isolate.run(
-                PROBE,
-                device,
-                {"lanes": lanes, "precision": precision},
-                doing=f"trying {lanes} lanes",
-                timeout_s=PROBE_TIMEOUT_S,
-                stopped=stopped,
-            )
+            return isolate.run(job, device, request, doing=doing, timeout_s=timeout_s, stopped=stopped), True
     except (FileError, Stopped):
         raise
     except ClfractalError as error:
-        return LaneReport(lanes, error.message), is_of_the_device(error)
-    return LaneReport(lanes, str(answer["fault"])), True
+        return {"fault": error.message}, is_of_the_device(error)
 
 
 def name_of(device: Device, precision: Precision, lanes: int, job: str, version: int) -> str:

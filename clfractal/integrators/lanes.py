@@ -13,10 +13,10 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from clfractal.device import activity, cache, isolate, select, tune
+from clfractal.device import cache, select, tune
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, Stopped
+from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.integrators.trial import RULES, Rule, march, picture_side
@@ -193,25 +193,14 @@ def _measured(
     if known is not None:
         return known
     on_start(f"measuring {device.info.name}, once")
-    try:
-        request = {"lanes": lanes, "precision": precision}
-        with activity.doing(f"measuring {device.info.name}"):
-            answer = isolate.run(
-                JOB,
-                device,
-                request,
-                doing=f"marching with {lanes} lanes",
-                timeout_s=_TIMEOUT_S,
-                stopped=stopped,
-            )
-        report = MarchReport(lanes=lanes, fault="", **answer)
-    except (FileError, Stopped):
-        raise
-    except ClfractalError as error:
-        report = MarchReport(lanes, 0.0, 0.0, error.message)
-        if not tune.is_of_the_device(error):
-            return report
-    cache.remember(_SECTION, key, asdict(report))
+    doing = f"marching with {lanes} lanes"
+    answer, is_known = tune.tried(
+        JOB, device, precision, lanes, doing=doing, timeout_s=_TIMEOUT_S, stopped=stopped
+    )
+    found: dict[str, Any] = {"scalar": 0.0, "jacobian": 0.0, "fault": "", **answer}
+    report = MarchReport(lanes, **found)
+    if is_known:
+        cache.remember(_SECTION, key, asdict(report))
     return report
 
 
