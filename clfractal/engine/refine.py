@@ -90,8 +90,7 @@ def refined(
 
     try:
         for divider in DIVIDERS:
-            coarse = replace(job, views=tuple(view.coarse(divider) for view in job.views))
-            small = JobFramebuffers(coarse)
+            small = JobFramebuffers(job.coarse(divider))
             state = passed(small)
             whole = JobFramebuffers(job)
             for framebuffer, found in zip(whole.framebuffers, small.framebuffers, strict=True):

@@ -386,8 +386,7 @@ def _rim(scene: Scene, volume: VolumeRenderer | None) -> list[tuple[float, float
 def _in_zoom(scene: Scene, renderer: VolumeRenderer, point: Floats) -> Floats:
     """Where the formula is evaluated for a point of a volume's picture: the last zoom appears in the first box's place."""
     first, last = used_boxes(scene, renderer)
-    found: Floats = np.array(last.center) + (point - np.array(first.center)) / renderer.magnification
-    return found
+    return np.asarray(np.array(last.center) + (point - np.array(first.center)) / renderer.magnification)
 
 
 def _shown_place(scene: Scene, renderer: VolumeRenderer) -> GridPlace:
@@ -426,8 +425,7 @@ def _meets_ball(view: View, center: Floats, radius: float) -> npt.NDArray[np.boo
     along = np.einsum("ij,ij->i", offset, directions)
     beside = np.einsum("ij,ij->i", offset, offset) - along**2
     reach = np.sqrt(np.maximum(radius**2 - beside, 0))
-    met: npt.NDArray[np.bool_] = (beside < radius**2) & (along + reach > 0)
-    return met
+    return np.asarray((beside < radius**2) & (along + reach > 0))
 
 
 def _sees(view: View, place: GridPlace) -> bool:

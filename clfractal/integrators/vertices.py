@@ -128,5 +128,4 @@ def _from_palette(coloring: Coloring, quantity: npt.NDArray[np.float32]) -> npt.
     at = np.nan_to_num(place) * intervals
     first = np.clip(at.astype(np.int64), 0, intervals - 1)
     share = (at - first).astype(np.float32)[:, None]
-    result: npt.NDArray[np.float32] = table[first] * (1 - share) + table[(first + 1) % SIZE] * share
-    return result
+    return np.asarray(table[first] * (1 - share) + table[(first + 1) % SIZE] * share)

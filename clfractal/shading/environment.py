@@ -161,8 +161,7 @@ def _means(values: Doubles, cells: int) -> Doubles:
     whole = np.zeros_like(values)
     np.cumsum((values[..., :-1] + values[..., 1:]) / 2, axis=-1, out=whole[..., 1:])
     integral = whole[..., left] + part * (start + 0.5 * part * step)
-    found: Doubles = np.maximum(np.diff(integral, axis=-1), 0.0) * (cells / (values.shape[-1] - 2))
-    return found
+    return np.asarray(np.maximum(np.diff(integral, axis=-1), 0.0) * (cells / (values.shape[-1] - 2)))
 
 
 def _maxima(values: Doubles, cells: int) -> Doubles:
@@ -175,8 +174,7 @@ def _maxima(values: Doubles, cells: int) -> Doubles:
     else:
         first = left[:-1] + (part[:-1] > 0)
         inside = np.maximum.reduceat(values[..., :-1], first, axis=-1)
-    found: Doubles = np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:]))
-    return found
+    return np.asarray(np.maximum(inside, np.maximum(at_borders[..., :-1], at_borders[..., 1:])))
 
 
 def _borders(values: Doubles, cells: int) -> tuple[npt.NDArray[np.int64], Doubles, Doubles, Doubles]:

@@ -179,8 +179,7 @@ def _unit(vectors: Doubles) -> npt.NDArray[np.float32]:
         scaled = vectors / np.abs(vectors).max(axis=1, keepdims=True, initial=0)
         scaled /= np.linalg.norm(scaled, axis=1, keepdims=True)
     scaled[~np.isfinite(scaled).all(axis=1)] = 0
-    result: npt.NDArray[np.float32] = scaled.astype(np.float32)
-    return result
+    return np.asarray(scaled, np.float32)
 
 
 def _fill_in(normals: npt.NDArray[np.float32], points: Doubles, triangles: npt.NDArray[np.int32]) -> None:

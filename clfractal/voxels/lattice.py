@@ -152,8 +152,7 @@ def lattice_of(box: Box, resolution: int | Shape) -> Lattice:
 def pack_places(x: npt.ArrayLike, y: npt.ArrayLike, z: npt.ArrayLike) -> Places:
     """Places of bricks or nodes as the kernels read them: 21 bits each, x lowest."""
     parts = [np.asarray(part, np.uint64) for part in (x, y, z)]
-    packed: Places = parts[0] | parts[1] << np.uint64(21) | parts[2] << np.uint64(42)
-    return packed
+    return np.asarray(parts[0] | parts[1] << np.uint64(21) | parts[2] << np.uint64(42))
 
 
 def unpack_places(places: Places) -> npt.NDArray[np.int64]:
