@@ -165,9 +165,11 @@ class Job:
         made = self.composition
         if not isinstance(made, StereoPair):
             return (None,) * len(self.views)
-        found: dict[int, Side] = {}
-        for side, part in made.eyes.items():
-            found |= dict.fromkeys((part.view,) if isinstance(part, Identity) else part.views, side)
+        found = {
+            view: side
+            for side, part in made.eyes.items()
+            for view in ((part.view,) if isinstance(part, Identity) else part.views)
+        }
         return tuple(found[number] for number in range(len(self.views)))
 
     def resolved(self) -> dict[str, Any]:

@@ -362,9 +362,11 @@ def _tone_defines() -> dict[str, object]:
     found |= {"TONE_SHIFT": tone.SHIFT, "TONE_LOWEST": tone.LOWEST, "TONE_ENTRIES": tone.ENTRIES}
     found |= {"TONE_LIGHTEST": exact(tone.LIGHTEST), "TONE_INSET": exact(tone.INSET)}
     found |= {"TONE_KEPT": exact(kept), "TONE_BACK": exact(np.float32(1) / kept)}
-    for name, weights in (("LUMINANCE", tone.LUMINANCE), ("GREY", tone.GREY)):
-        found |= {f"{name}_{color}": exact(weight) for color, weight in zip("RGB", weights, strict=True)}
-    return found
+    return found | {
+        f"{name}_{color}": exact(weight)
+        for name, weights in (("LUMINANCE", tone.LUMINANCE), ("GREY", tone.GREY))
+        for color, weight in zip("RGB", weights, strict=True)
+    }
 
 
 def _way(look: Look) -> tuple[int, int, npt.NDArray[np.float32]]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 from contextlib import suppress
+from itertools import takewhile
 from pathlib import Path
 
 import numpy as np
@@ -44,11 +45,8 @@ def words_of(text: str) -> tuple[str, str]:
 
     How long the picture takes at its full size is left out.
     """
-    lines = []
-    for line in text.splitlines():
-        if not line.startswith("#"):
-            break
-        lines.append(line.lstrip("#").strip())
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    lines = [line.lstrip("#").strip() for line in comment]
     about = " ".join(lines[1:]).replace("`", "")
     return (lines[0] if lines else "", _TAKES.sub("", about).strip())
 

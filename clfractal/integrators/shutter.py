@@ -180,7 +180,4 @@ def _places_of(count: int) -> tuple[int, ...]:
     """Which part of the opening each sample has: early ones are spread over all of it, in van der Corput's order."""
     bits = max((count - 1).bit_length(), 1)
     turned = sorted(range(count), key=lambda sample: int(f"{sample:0{bits}b}"[::-1], 2))
-    places = [0] * count
-    for place, sample in enumerate(turned):
-        places[sample] = place
-    return tuple(places)
+    return tuple(sorted(range(count), key=turned.__getitem__))

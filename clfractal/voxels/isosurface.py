@@ -191,9 +191,8 @@ def _fill_in(normals: npt.NDArray[np.float32], points: Doubles, triangles: npt.N
     corners = points[some]
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     numbers, places = np.unique(some.reshape(-1), return_inverse=True)
-    sums = np.zeros((len(numbers), 3))
-    for axis in range(3):
-        sums[:, axis] = np.bincount(places.reshape(-1), np.repeat(flat[:, axis], 3), len(numbers))
+    each = [np.bincount(places.reshape(-1), np.repeat(along, 3), len(numbers)) for along in flat.T]
+    sums = np.stack(each, axis=1)
     asked = missing[numbers]
     normals[numbers[asked]] = _unit(sums[asked])
 
