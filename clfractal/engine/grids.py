@@ -22,7 +22,7 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_objects
 from clfractal.scene.volume import VolumeRenderer
-from clfractal.voxels.fill import FillProgress, fill_grid
+from clfractal.voxels.fill import fill_grid
 from clfractal.voxels.grid import Grid
 from clfractal.voxels.lattice import lattice_of
 
@@ -106,8 +106,8 @@ def filled(
     job = prepare(scene, chosen, on_start=talk.say)
     plan = job.views[0].plan
 
-    def progress(state: FillProgress) -> None:
-        talk.progress(f"voxels, {state.stage}", state.done / max(state.total, 1))
+    def progress(stage: str, done: int, total: int) -> None:
+        talk.progress(f"voxels, {stage}", done / max(total, 1))
 
     grid = fill_grid(
         scene,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -35,16 +35,9 @@ NODE_SAFETY = 0.55
 OCTANT = 4
 
 
-@dataclass(frozen=True, slots=True)
-class FillProgress:
-    """The progress of a fill: the stage (`octree`, `fill`, `store` or `normals`), and its bricks."""
-
-    stage: str
-    done: int
-    total: int
-
-
-ProgressCallback = Callable[[FillProgress], None]
+ProgressCallback = Callable[[str, int, int], None]
+"""Told the progress of a fill: the stage (`octree`, `fill`, `store` or `normals`), how many bricks of it are done, and of
+how many."""
 
 
 def fill_grid(
@@ -305,4 +298,4 @@ class _Filler:
 
     def _tell(self, stage: str, done: int, total: int) -> None:
         if self.progress is not None:
-            self.progress(FillProgress(stage, done, total))
+            self.progress(stage, done, total)

@@ -12,7 +12,6 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
-from clfractal.voxels.fill import FillProgress
 from tests.devices import device
 from tests.voxels.grids import ROUNDED, differing_voxels, filled, inside, volume_scene, voxel_points
 
@@ -189,12 +188,12 @@ def test_too_large_a_grid_is_refused_before_anything_is_done(
 
 def test_progress_and_an_interrupt_in_it() -> None:
     scene = volume_scene("hast", 20, resolution=64)
-    seen: list[FillProgress] = []
-    filled(scene, progress=seen.append)
-    assert {each.stage for each in seen} == {"octree", "fill", "store"}
-    assert all(0 <= each.done <= each.total for each in seen)
+    seen: list[tuple[str, int, int]] = []
+    filled(scene, progress=lambda *each: seen.append(each))
+    assert {stage for stage, _, _ in seen} == {"octree", "fill", "store"}
+    assert all(0 <= done <= total for _, done, total in seen)
 
-    def stop(progress: FillProgress) -> None:
+    def stop(stage: str, done: int, total: int) -> None:
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
