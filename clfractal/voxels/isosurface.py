@@ -192,7 +192,7 @@ def _fill_in(normals: npt.NDArray[np.float32], points: Doubles, triangles: npt.N
     flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     numbers, places = np.unique(some.reshape(-1), return_inverse=True)
     each = [np.bincount(places.reshape(-1), np.repeat(along, 3), len(numbers)) for along in flat.T]
-    sums = np.stack(each, axis=1)
+    sums = np.array(each, np.float64).T
     asked = missing[numbers]
     normals[numbers[asked]] = _unit(sums[asked])
 
