@@ -87,8 +87,6 @@ class CameraBase(Section):
 
     @model_validator(mode="after")
     def _stands_somewhere(self) -> Self:
-        if length(self.up) < 1e-12:
-            raise problem("must not be zero", "up")
         if _SAID not in self.__dict__:  # this is asked again of a camera that is put into another scene
             self._remember({name: getattr(self, name) for name in (*PLACE, *WORDS, "frame")})
         if self.orbit is None or not self.orbit.complete:

@@ -8,7 +8,7 @@ from clfractal.schema.base import Coordinate, Length, problem
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
 from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
-from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.stops import Palette
 from clfractal.schema.trap import Trap
 
 
@@ -39,11 +39,6 @@ class Coloring(ByQuantity):
         None, description="step in that direction, scene units; null: 1/100 of the bounds' radius"
     )
     trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape for `by: trap`")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        check_order(self.palette)
-        return self
 
     @property
     def uses_palette(self) -> bool:

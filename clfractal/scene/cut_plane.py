@@ -1,8 +1,8 @@
 """The cut-plane renderer's settings, and cut planes in another renderer's picture."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.scene.objects import MAX_OBJECTS
 from clfractal.scene.rectangle import Plane
@@ -10,7 +10,7 @@ from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.schema.fields import WHOLE, Usual
 from clfractal.schema.names import ObjectName
-from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.stops import Palette
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
 
@@ -33,11 +33,6 @@ class EscapeColors(Section):
         False, description="true: the palette repeats; false: its first and last colour continue"
     )
     inside: Color = Field((0.0, 0.0, 0.0), description="colour of points that never escape, linear Rec. 709")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        check_order(self.palette)
-        return self
 
 
 class CutPlaneRenderer(Sampled):

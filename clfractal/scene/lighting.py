@@ -12,7 +12,6 @@ from clfractal.schema.base import (
     Length,
     Reflectance,
     Section,
-    length,
     problem,
 )
 from clfractal.schema.fields import Usual
@@ -117,9 +116,3 @@ class Fog(Section):
         None, description="shafts of light: what the fog scatters of each light; null: `color` alone"
     )
     background: bool = Field(True, description="whether the fog also covers the background")
-
-    @model_validator(mode="after")
-    def _has_an_up(self) -> Self:
-        if length(self.up) < 1e-12:
-            raise problem("must not be zero", "up")
-        return self

@@ -65,10 +65,7 @@ class WaterObject(Level):
 
     @model_validator(mode="after")
     def _travels_somewhere(self) -> Self:
-        way = self.waves.direction
-        if length(way) < 1e-12:
-            raise problem("must not be zero", "waves.direction")
-        if length(cross(unit(way), unit(self.normal))) < 1e-6:
+        if length(cross(unit(self.waves.direction), unit(self.normal))) < 1e-6:
             raise problem("must not be along the normal", "waves.direction")
         return self
 

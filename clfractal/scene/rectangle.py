@@ -14,6 +14,7 @@ from clfractal.schema.base import (
     Position,
     Section,
     Vector,
+    check_frame,
     cross,
     dot,
     length,
@@ -91,13 +92,8 @@ class Plane(Section):
             if abs(dot(side, up)) > 1e-4 * width * height:
                 raise problem("must have a right angle at the first corner, the lower left one", "corners")
             return self
-        if length(self.normal) < 1e-12:
-            raise problem("must not be zero", "normal")
         if self.up is not None:
-            if length(self.up) < 1e-12:
-                raise problem("must not be zero", "up")
-            if length(cross(self.normal, self.up)) <= 1e-6 * length(self.normal) * length(self.up):
-                raise problem("must not be parallel to the normal", "up")
+            check_frame(self.normal, self.up)
         return self
 
     @model_validator(mode="after")

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.errors import SceneError, Where
-from clfractal.schema.base import Direction, Position, Reflectance, Section, cross, length, problem
+from clfractal.schema.base import Direction, Position, Reflectance, Section, check_frame, problem
 from clfractal.schema.fields import SCALE, Usual
 
 # Screen, distance and eyes are measured in one unit, so their ratios cannot be larger than this.
@@ -71,12 +71,7 @@ class StereoPlane(Section):
 
     @model_validator(mode="after")
     def _faces_somewhere(self) -> Self:
-        if length(self.normal) < 1e-12:
-            raise problem("must not be zero", "normal")
-        if length(self.up) < 1e-12:
-            raise problem("must not be zero", "up")
-        if length(cross(self.normal, self.up)) <= 1e-6 * length(self.normal) * length(self.up):
-            raise problem("must not be parallel to the normal", "up")
+        check_frame(self.normal, self.up)
         return self
 
 

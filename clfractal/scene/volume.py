@@ -10,6 +10,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
 from clfractal.schema.fields import SCALE, Usual
+from clfractal.schema.stops import IN_ORDER
 
 MAX_RESOLUTION = 16_384
 Side = Annotated[int, Field(strict=True, ge=2, le=MAX_RESOLUTION)]
@@ -75,27 +76,19 @@ class EmissionStop(Section):
 class Transfer(Section):
     """Opacity, colour and emission of the voxels' values."""
 
-    opacity: Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = (
-        Field(None, description="stops in order of `at`; null: a surface at the renderer's level")
-    )
-    color: Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256)] | None = Field(
-        None, description="stops in order of `at`; null: the material's colour"
-    )
+    opacity: (
+        Annotated[tuple[OpacityStop, ...], Field(strict=False, min_length=1, max_length=256), IN_ORDER] | None
+    ) = Field(None, description="stops in order of `at`; null: a surface at the renderer's level")
+    color: (
+        Annotated[tuple[ColorStop, ...], Field(strict=False, min_length=1, max_length=256), IN_ORDER] | None
+    ) = Field(None, description="stops in order of `at`; null: the material's colour")
     emission: (
-        Annotated[tuple[EmissionStop, ...], Field(strict=False, min_length=1, max_length=256)] | None
+        Annotated[tuple[EmissionStop, ...], Field(strict=False, min_length=1, max_length=256), IN_ORDER]
+        | None
     ) = Field(None, description="stops in order of `at`, beside `opacity`; null: nothing shines by itself")
 
     @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for name in ("opacity", "color", "emission"):
-            stops = getattr(self, name) or ()
-            for index in range(1, len(stops)):
-                if stops[index].at < stops[index - 1].at:
-                    raise problem(
-                        f"must be at least {stops[index - 1].at:g}, the value at the stop before,"
-                        f" got {stops[index].at:g}",
-                        f"{name}.{index}.at",
-                    )
+    def _has_depth(self) -> Self:
         if self.emission is not None and self.opacity is None:
             raise problem("needs opacity, since a surface at a level has no depth that shines", "emission")
         return self

@@ -10,6 +10,7 @@ from math import cos, fmod, radians, sin
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     ConfigDict,
     Discriminator,
@@ -33,9 +34,18 @@ Angle = Annotated[float, Field(strict=True, ge=-36_000, le=36_000, allow_inf_nan
 Length = Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)]
 Number = Annotated[float, Field(strict=True, ge=-1e12, le=1e12, allow_inf_nan=False)]
 
+
+def _not_zero(direction: Vector) -> Vector:
+    if length(direction) < 1e-12:
+        raise problem("must not be zero")
+    return direction
+
+
 # Strict tuples would refuse the lists of YAML and JSON; their entries stay strict.
 Position = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), PLACE]
-Direction = Annotated[tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), DIRECTION]
+Direction = Annotated[
+    tuple[Coordinate, Coordinate, Coordinate], Field(strict=False), DIRECTION, AfterValidator(_not_zero)
+]
 Color = Annotated[tuple[Amount, Amount, Amount], Field(strict=False), AS_TEXT]
 Reflectance = Annotated[tuple[Fraction, Fraction, Fraction], Field(strict=False), AS_TEXT]
 
@@ -227,6 +237,12 @@ def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
     across, along = cross(axis, vector), dot(axis, vector) * (1 - c)
     x, y, z = (v * c + a * s + k * along for v, a, k in zip(vector, across, axis, strict=True))
     return (x, y, z)
+
+
+def check_frame(normal: Vector, up: Vector) -> None:
+    """For validators of rectangles: `up` must not lie along the normal."""
+    if length(cross(normal, up)) <= 1e-6 * length(normal) * length(up):
+        raise problem("must not be parallel to the normal", "up")
 
 
 def cos_sin(degrees: float) -> tuple[float, float]:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import Field, model_validator
 
-from clfractal.schema.base import Amount, Color, Section, Vector, length, problem
+from clfractal.schema.base import Amount, Color, Vector, problem
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import Element
 from clfractal.schema.record import Number
@@ -64,8 +64,9 @@ class LightBase(Element):
 
     @property
     def stands_at(self) -> Vector | None:
-        """Where it stands; None: infinitely far away, or in many places."""
-        return None
+        """Where it stands, its `position`; None: infinitely far away, or in many places."""
+        place: Vector | None = getattr(self, "position", None)
+        return place
 
     @property
     def reads(self) -> str | None:
@@ -128,10 +129,3 @@ class SmallLight(SingleLight):
         """As of every light."""
         # 1 - cos a = 2 sin(a/2)^2, which keeps its digits for the smallest lights.
         return {**super().packed(), "spread": 2 * sin(radians(self.angular_size) / 4) ** 2}
-
-
-def check_ways(section: Section, *names: str) -> None:
-    """For validators of sections with directions: none may be zero."""
-    for name in names:
-        if length(getattr(section, name)) < 1e-12:
-            raise problem("must not be zero", name)

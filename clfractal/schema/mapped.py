@@ -16,13 +16,12 @@ from clfractal.schema.base import (
     Position,
     Reflectance,
     Section,
-    length,
     problem,
 )
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
 from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
-from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.stops import Palette, in_order
 from clfractal.schema.trap import Trap
 
 TextureName = Annotated[str, Field(strict=True, min_length=1, max_length=1000)]
@@ -68,8 +67,6 @@ class Map(ByQuantity):
             raise problem("needs one of by or texture")
         if self.by is not None and self.texture is not None:
             raise problem("cannot be combined with by: give one of by or texture", "texture")
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
         low, high = self.used_range
         if low == high:
             raise problem(f"must be two different numbers, got {low:g} twice", "range")
@@ -122,21 +119,11 @@ class NumberMap(Map):
     curve: Annotated[
         tuple[Annotated[tuple[Fraction, Number], Field(strict=False)], ...],
         Field(strict=False, min_length=2, max_length=256),
+        in_order(lambda point: point[0], "0", "the place of the point before"),
     ] = Field(
         ((0.0, 0.0), (1.0, 1.0)),
         description="[place in the range, 0 to 1; value there], joined by straight lines",
     )
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        for index in range(1, len(self.curve)):
-            at, before = self.curve[index][0], self.curve[index - 1][0]
-            if at < before:
-                raise problem(
-                    f"must be at least {before:g}, the place of the point before, got {at:g}",
-                    f"curve.{index}.0",
-                )
-        return self
 
     @property
     def is_flat(self) -> bool:
@@ -153,11 +140,6 @@ class ColorMap(Map):
     """A colour that differs from place to place: a palette along a quantity, or a picture's colours."""
 
     palette: Palette = "viridis"
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        check_order(self.palette)
-        return self
 
     def check(self, high: float, low: float) -> None:
         """Of the palette's colours."""

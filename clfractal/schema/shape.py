@@ -2,11 +2,11 @@
 
 import math
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Literal, Self, TypeAlias
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Angle, Direction, Length, Position, Vector, length, problem, turn
+from clfractal.schema.base import Angle, Direction, Length, Position, Vector, length, turn
 from clfractal.schema.fields import SCALE
 from clfractal.schema.kinds import Element, members
 from clfractal.schema.names import MaterialName
@@ -81,12 +81,6 @@ class Level(ObjectBase):
     """A surface without an end, seen from both sides."""
 
     normal: Direction = Field((0.0, 0.0, 1.0), description="direction that it faces")
-
-    @model_validator(mode="after")
-    def _faces_somewhere(self) -> Self:
-        if length(self.normal) < 1e-12:
-            raise problem("must not be zero", "normal")
-        return self
 
 
 class Solid(Simple):

@@ -1,9 +1,10 @@
 """Palettes as scenes name them, or tell their stops."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from itertools import pairwise
 from typing import Annotated, Any
 
-from pydantic import Field, Tag
+from pydantic import AfterValidator, Field, Tag
 
 from clfractal.schema.base import Color, Fraction, Section, chosen_by_word, problem
 from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, linear_color
@@ -14,6 +15,24 @@ class Stop(Section):
 
     at: Fraction = Field(description="place in the palette, 0 to 1")
     color: Color = Field(description="linear Rec. 709")
+
+
+def in_order(
+    place: Callable[[Any], float], key: str = "at", shown: str = "the value at the stop before"
+) -> AfterValidator:
+    """For a list: the places of its entries, which stand under `key`, must not fall."""
+
+    def check(entries: Sequence[Any]) -> Sequence[Any]:
+        for index, (before, at) in enumerate(pairwise(map(place, entries)), start=1):
+            if at < before:
+                raise problem(f"must be at least {before:g}, {shown}, got {at:g}", f"{index}.{key}")
+        return entries
+
+    return AfterValidator(check)
+
+
+IN_ORDER = in_order(lambda stop: stop.at)
+"""For stops in order of `at`."""
 
 
 def _placed_stops(value: Any) -> Any:
@@ -39,6 +58,7 @@ Palette = Annotated[
     | Annotated[
         tuple[Annotated[Stop, AlsoAs(lambda entry: entry, COLOR_SCHEMA)], ...],
         Field(strict=False, min_length=2, max_length=256),
+        IN_ORDER,
         AlsoAs(_placed_stops, None),
         Tag("stops"),
     ],
@@ -47,16 +67,3 @@ Palette = Annotated[
         description="a palette's name; or stops in order of `at`; or colours alone, at equal distances",
     ),
 ]
-
-
-def check_order(palette: str | Sequence[Stop]) -> None:
-    """For validators of sections with a `palette`: its stops must be in order."""
-    if isinstance(palette, str):
-        return
-    for index in range(1, len(palette)):
-        at, before = palette[index].at, palette[index - 1].at
-        if at < before:
-            raise problem(
-                f"must be at least {before:g}, the value at the stop before, got {at:g}",
-                f"palette.{index}.at",
-            )

@@ -1,11 +1,11 @@
 """Orbit traps, of colours, glow and lights."""
 
 from abc import abstractmethod
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Direction, Length, Position, Section, length, problem, unit
+from clfractal.schema.base import Direction, Length, Position, Section, unit
 from clfractal.schema.kinds import Kind, OneOf, by_word
 
 
@@ -42,12 +42,6 @@ class Trap(Section):
     )
     direction: Direction = Field((0.0, 0.0, 1.0), description="the axis's direction, or the plane's normal")
     radius: Length = Field(1.0, description="the sphere's radius")
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if length(self.direction) < 1e-12:
-            raise problem("must not be zero", "direction")
-        return self
 
     @property
     def used_keys(self) -> tuple[str, ...]:

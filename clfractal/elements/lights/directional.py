@@ -1,12 +1,12 @@
 """A light that is infinitely far away."""
 
 from collections.abc import Mapping
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.schema.base import Direction
-from clfractal.schema.light import SmallLight, check_ways
+from clfractal.schema.light import SmallLight
 
 
 class DirectionalLight(SmallLight):
@@ -18,11 +18,6 @@ class DirectionalLight(SmallLight):
     place = 10
     type: Literal["directional"] = "directional"
     direction: Direction = Field((-1.0, 1.0, -1.0), description="direction in which the light travels")
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        check_ways(self, "direction")
-        return self
 
     def controls(self, radius: float) -> Mapping[str, Mapping[str, Any]]:
         """As of every light."""

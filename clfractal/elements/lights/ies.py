@@ -10,8 +10,8 @@ from pydantic import Field, model_validator
 
 from clfractal.errors import FileError, Where
 from clfractal.files.regular import read_bytes
-from clfractal.schema.base import Amount, Direction, Position, Vector, cross, length, problem, unit
-from clfractal.schema.light import AXIS, SmallLight, check_ways
+from clfractal.schema.base import Amount, Direction, Position, cross, length, problem, unit
+from clfractal.schema.light import AXIS, SmallLight
 from clfractal.schema.record import Number
 
 _TYPES = {1: "C", 2: "B", 3: "A"}
@@ -51,7 +51,6 @@ class IesLight(SmallLight):
 
     @model_validator(mode="after")
     def _has_a_frame(self) -> Self:
-        check_ways(self, "direction", "up")
         if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
             raise problem("must not be along direction", "up")
         return self
@@ -59,11 +58,6 @@ class IesLight(SmallLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return 1 / away**2
-
-    @property
-    def stands_at(self) -> Vector:
-        """As of every light."""
-        return self.position
 
     @property
     def reads(self) -> str | None:

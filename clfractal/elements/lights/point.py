@@ -4,7 +4,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from clfractal.schema.base import Position, Vector
+from clfractal.schema.base import Position
 from clfractal.schema.light import SmallLight
 
 
@@ -26,11 +26,6 @@ class PointLight(SmallLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return 1.0 if self.falloff == "none" else 1 / away**2
-
-    @property
-    def stands_at(self) -> Vector:
-        """As of every light."""
-        return self.position
 
     def packed(self) -> dict[str, object]:
         """As of every light."""

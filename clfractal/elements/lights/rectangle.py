@@ -6,7 +6,7 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from clfractal.schema.base import Direction, Length, Position, Vector, cross, length, problem, unit
-from clfractal.schema.light import AXIS, SingleLight, check_ways
+from clfractal.schema.light import AXIS, SingleLight
 from clfractal.schema.record import Number
 
 
@@ -34,7 +34,6 @@ class RectangleLight(SingleLight):
 
     @model_validator(mode="after")
     def _has_a_frame(self) -> Self:
-        check_ways(self, "direction", "up")
         if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
             raise problem("must not be along direction", "up")
         return self
@@ -47,11 +46,6 @@ class RectangleLight(SingleLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return min(self.width * self.height / (pi * away**2), 1.0)
-
-    @property
-    def stands_at(self) -> Vector:
-        """As of every light."""
-        return self.position
 
     @property
     def frame(self) -> tuple[Vector, Vector]:

@@ -1,14 +1,14 @@
 """Lights on the set, of which kernels read a list (`kernels/shading/set_lights.h`)."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.schema.ball import Ball
 from clfractal.schema.base import Amount, Length
 from clfractal.schema.light import LightBase
-from clfractal.schema.stops import Palette, check_order
+from clfractal.schema.stops import Palette
 from clfractal.schema.trap import Trap
 
 MAX_PLACES = 20_000
@@ -53,12 +53,6 @@ class SetLight(LightBase):
     )
     visible: bool = Field(True, description="whether the eye sees them; mirrors and paths of light always do")
     seed: Annotated[int, Field(strict=True, ge=0, le=2**32 - 1)] = Field(0, description="chooses the places")
-
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
-        if self.palette is not None:
-            check_order(self.palette)
-        return self
 
     def controls(self, radius: float) -> Mapping[str, Mapping[str, Any]]:
         """As of every light."""

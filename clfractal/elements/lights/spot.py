@@ -1,12 +1,12 @@
 """A light at a point that shines into a cone."""
 
 from math import radians
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Direction, Fraction, Position, Vector, unit
-from clfractal.schema.light import AXIS, SmallLight, check_ways
+from clfractal.schema.base import Direction, Fraction, Position, unit
+from clfractal.schema.light import AXIS, SmallLight
 from clfractal.schema.record import Number
 
 
@@ -36,11 +36,6 @@ class SpotLight(SmallLight):
         0.2, description="part of the cone's half angle over which the light fades at its rim; 0: a sharp rim"
     )
 
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        check_ways(self, "direction")
-        return self
-
     @classmethod
     def first(cls, away: float) -> dict[str, Any]:
         """As of every light."""
@@ -49,11 +44,6 @@ class SpotLight(SmallLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return 1.0 if self.falloff == "none" else 1 / away**2
-
-    @property
-    def stands_at(self) -> Vector:
-        """As of every light."""
-        return self.position
 
     def packed(self) -> dict[str, object]:
         """As of every light."""

@@ -1,10 +1,10 @@
 """What the boundary of the body mirrors."""
 
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Direction, length, problem
+from clfractal.schema.base import Direction
 from clfractal.schema.fields import Usual
 from clfractal.schema.mapped import FractionMap, ReflectanceMap
 from clfractal.schema.material import WHITE, IorMap, Part
@@ -29,9 +29,3 @@ class Specular(Part):
         description="direction in space, laid onto the surface, in which highlights are drawn out: across brush marks",
     )
     ior: Annotated[IorMap, Usual(1, 3)] = Field(1.5, description="index of refraction of a dielectric")
-
-    @model_validator(mode="after")
-    def _goes_somewhere(self) -> Self:
-        if length(self.tangent) < 1e-12:
-            raise problem("must not be zero", "tangent")
-        return self
