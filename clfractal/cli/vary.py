@@ -32,7 +32,7 @@ from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.textures import rename_textures
+from clfractal.scene.named_files import rename_textures
 
 if TYPE_CHECKING:
     from clfractal.engine.engine import Engine

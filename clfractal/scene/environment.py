@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.activity import doing
-from clfractal.errors import FileError, SceneError, Where, unknown_name
+from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files import resources
 
 if TYPE_CHECKING:
@@ -74,15 +74,10 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
     if environment.file is None:
         return _shipped(environment.name or "")
     from clfractal.files.environment_map import read_environment
-    from clfractal.formulas.catalog import safe_path
+    from clfractal.scene.beside import reading_beside
 
-    where = Where(path="environment.file")
-    path = safe_path(environment.file, folder, where)
-    try:
-        with doing(f"reading {path}"):
-            return EnvironmentMap(read_environment(path))
-    except FileError as error:
-        raise FileError(error.inside(str(path)), where, details=error.details) from error
+    with reading_beside(environment.file, folder, Where(path="environment.file")) as path:
+        return EnvironmentMap(read_environment(path))
 
 
 @cache

@@ -11,12 +11,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.activity import doing
-from clfractal.errors import FileError, Where
+from clfractal.errors import Where
+from clfractal.scene.beside import reading_beside
 from clfractal.scene.grid_place import GridPlace, vector_of
 from clfractal.scene.grid_values import finite_range
 
 if TYPE_CHECKING:
+    from clfractal.files.volume_file import Volume
     from clfractal.scene.volume import Box, VolumeRenderer
 
 _WHERE = Where(path="renderer.file")
@@ -62,20 +63,13 @@ def read_grid(file: str, folder: Path, where: Where, box: Box | None = None) -> 
     Raises:
         FileError: at `where`, for a file out of the folder, or whatever is wrong with it.
     """
-    from clfractal.formulas.catalog import safe_path
-
-    path = safe_path(file, folder, where)
-    with doing(f"reading {path}"):
-        return _read(path, where, box)
-
-
-def _read(path: Path, where: Where, box: Box | None) -> GivenGrid:
     from clfractal.files.volume_file import read_volume
 
-    try:
-        volume = read_volume(path)
-    except FileError as error:
-        raise FileError(error.inside(str(path)), where, details=error.details) from error
+    with reading_beside(file, folder, where) as path:
+        return _placed(read_volume(path), box)
+
+
+def _placed(volume: Volume, box: Box | None) -> GivenGrid:
     values, directions = volume.values, volume.directions
     # Which axis of space each axis of the array follows most closely, and whether it runs against it.
     order = _order(directions)

@@ -3,7 +3,8 @@
 from clfractal.errors import SceneError, Where
 from clfractal.scene.grid_values import is_finite_somewhere, lacking
 from clfractal.scene.model import Scene
-from clfractal.scene.object_grids import PlacedGrid, placed, used_level, volumes_of
+from clfractal.scene.named_files import volumes_of
+from clfractal.scene.object_grids import PlacedGrid, placed, used_level
 from clfractal.schema.base import Vector
 
 

@@ -24,6 +24,7 @@ from clfractal.scene.light_paths import Lighting, PathLighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
 from clfractal.scene.moved_cameras import with_words
+from clfractal.scene.named_files import grid_files, light_files, texture_files
 from clfractal.scene.objects import FormulaObject, Objects, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.reads import Reads, is_data, is_table, section_of
@@ -39,11 +40,18 @@ if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
     from clfractal.scene.environment import EnvironmentMap
     from clfractal.scene.given import GivenGrid
-    from clfractal.scene.light_tables import Key, LightTable
+    from clfractal.scene.light_tables import LightTable
+    from clfractal.scene.named_files import Key
     from clfractal.scene.textures import Texture
 
 
 T = TypeVar("T")
+# The files that data were read from, by the names of the data.
+_NAMED: Mapping[str, Callable[[Any], Mapping[Any, str]]] = {
+    "textures": texture_files,
+    "light_tables": light_files,
+    "grids": grid_files,
+}
 # In a validator's context: sections are replaced one by one, and cameras get their places when all have been.
 _PART = "part"
 
@@ -237,22 +245,16 @@ class Scene(Section):
                         copied, name, update[name], context={"folder": self._folder, _PART: True}
                     )
         copied._frame()
-        if "materials" in update and "textures" in self._read:
-            from clfractal.scene.textures import texture_files
-
-            # Other values of materials, as of each frame of a film, show the same pictures.
-            if set(texture_files(copied.materials)) <= set(self._read["textures"]):
-                copied._read["textures"] = self._read["textures"]
-        if "lights" in update and "light_tables" in self._read:
-            from clfractal.scene.light_tables import light_files
-
-            if light_files(copied.lights).keys() <= self._read["light_tables"].keys():
-                copied._read["light_tables"] = self._read["light_tables"]
-        if "objects" in update and "grids" in self._read:
-            from clfractal.scene.object_grids import grid_files
-
-            if set(grid_files(copied.objects)) <= set(self._read["grids"]):
-                copied._read["grids"] = self._read["grids"]
+        # Other values of a section, as of each frame of a film, name the same files.
+        for name, files in _NAMED.items():
+            known = self._read.get(name)
+            section = section_of(name)
+            if (
+                section in update
+                and known is not None
+                and files(getattr(copied, section)).keys() <= known.keys()
+            ):
+                copied._read[name] = known
         return copied
 
     def __getstate__(self) -> dict[Any, Any]:
@@ -377,7 +379,7 @@ class Scene(Section):
             FileError: a file is missing or no grid; the path says where it is named.
             SceneError: they have too many values.
         """
-        from clfractal.scene.object_grids import grid_files, read_grids
+        from clfractal.scene.object_grids import read_grids
 
         if not grid_files(self.objects):
             return {}

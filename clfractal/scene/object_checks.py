@@ -6,6 +6,7 @@ from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
+from clfractal.scene.named_files import volumes_of
 from clfractal.scene.objects import KINDS, MAX_FORMULAS, MAX_VOLUMES, FormulaObject, VolumeObject, WaterObject
 from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.surface import SurfaceRenderer
@@ -110,7 +111,7 @@ def _check_filled(scene: Scene, renderer: VolumeRenderer | CutPlaneRenderer) -> 
 
 def _check_volumes(scene: Scene) -> None:
     """How many there may be, and what clouds need."""
-    volumes = {name: each for name, each in scene.objects.items() if isinstance(each, VolumeObject)}
+    volumes = volumes_of(scene.objects)
     if len(volumes) > MAX_VOLUMES:
         raise SceneError(
             f"at most {MAX_VOLUMES} objects can be volumes, and this is one more",

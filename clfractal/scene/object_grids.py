@@ -11,31 +11,10 @@ import numpy as np
 from clfractal.errors import SceneError, Where
 from clfractal.scene.given import GivenGrid, read_grid
 from clfractal.scene.grid_place import GridPlace, vector_of
+from clfractal.scene.named_files import grid_files
 from clfractal.scene.objects import MAX_VALUES, VolumeObject
 from clfractal.schema.base import Vector
 from clfractal.schema.shape import ObjectBase, turned_axes
-
-
-def volumes_of(objects: Mapping[str, ObjectBase]) -> dict[str, VolumeObject]:
-    """Those that are volumes, by name."""
-    return {name: each for name, each in objects.items() if isinstance(each, VolumeObject)}
-
-
-def grid_files(objects: Mapping[str, ObjectBase]) -> dict[str, str]:
-    """The files that volumes name, and of each the path of the key that names it first."""
-    found: dict[str, str] = {}
-    for name, each in volumes_of(objects).items():
-        found.setdefault(each.file, f"objects.{name}.file")
-    return found
-
-
-def with_grids(objects: Mapping[str, ObjectBase], names: Mapping[str, str]) -> dict[str, ObjectBase]:
-    """The objects with other names of their files; those without any are the same."""
-    result = dict(objects)
-    for name, each in volumes_of(objects).items():
-        if names.get(each.file, each.file) != each.file:
-            result[name] = each.model_copy(update={"file": names[each.file]})
-    return result
 
 
 def read_grids(objects: Mapping[str, ObjectBase], folder: Path) -> dict[str, GivenGrid]:

@@ -18,11 +18,16 @@ from clfractal.files.document import read_document
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.formulas.catalog import safe_path
 from clfractal.scene.layout import LayoutView
-from clfractal.scene.light_tables import light_files, with_light_files
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene
-from clfractal.scene.object_grids import grid_files, with_grids
-from clfractal.scene.textures import texture_files, with_textures
+from clfractal.scene.named_files import (
+    grid_files,
+    light_files,
+    texture_files,
+    with_grids,
+    with_light_files,
+    with_textures,
+)
 from clfractal.scene.volume import VolumeRenderer
 
 _DEEPEST = 3

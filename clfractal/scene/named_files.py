@@ -1,0 +1,87 @@
+"""The files that parts of a scene name, and these parts with other names of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeAlias
+
+from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.objects import VolumeObject
+from clfractal.schema.light import LightBase
+from clfractal.schema.mapped import maps_of
+from clfractal.schema.shape import ObjectBase
+
+Key: TypeAlias = tuple[str, str]
+"""The word of a kind of lights, and the name of a file that lights of this kind read."""
+
+
+def texture_files(materials: Mapping[str, PbrMaterial]) -> dict[str, str]:
+    """The files that materials name, and of each the path of the key that names it first."""
+    found: dict[str, str] = {}
+    for name, material in materials.items():
+        for key, each in maps_of(material):
+            if each.texture is not None:
+                found.setdefault(each.texture, f"materials.{name}.{key}.texture")
+    return found
+
+
+def with_textures(materials: Mapping[str, PbrMaterial], names: Mapping[str, str]) -> dict[str, PbrMaterial]:
+    """The materials with other names of their files; those without any are the same objects."""
+    result = dict(materials)
+    for name, material in materials.items():
+        if any(each.texture in names for _, each in maps_of(material)):
+            given = material.model_dump(exclude_unset=True)
+            rename_textures(given, lambda file: names.get(file, file))
+            result[name] = PbrMaterial.checked(given)
+    return result
+
+
+def rename_textures(data: Any, new: Callable[[str], str]) -> None:
+    """Gives the files in plain data of materials other names."""
+    if not isinstance(data, dict):
+        return
+    if isinstance(data.get("texture"), str):
+        data["texture"] = new(data["texture"])
+    for each in data.values():
+        rename_textures(each, new)
+
+
+def light_files(lights: Iterable[LightBase]) -> dict[Key, str]:
+    """The files that lights read, and of each the path of the key that names it first."""
+    found: dict[Key, str] = {}
+    for number, light in enumerate(lights):
+        if light.reads is not None:
+            found.setdefault((light.tag, light.reads), f"lights.{number}.file")
+    return found
+
+
+def with_light_files(lights: tuple[LightBase, ...], names: Mapping[str, str]) -> tuple[LightBase, ...]:
+    """The lights with other names of their files; those without any are the same objects."""
+    return tuple(
+        light.model_copy(update={"file": names[light.reads]})
+        if light.reads and light.reads in names
+        else light
+        for light in lights
+    )
+
+
+def volumes_of(objects: Mapping[str, ObjectBase]) -> dict[str, VolumeObject]:
+    """Those that are volumes, by name."""
+    return {name: each for name, each in objects.items() if isinstance(each, VolumeObject)}
+
+
+def grid_files(objects: Mapping[str, ObjectBase]) -> dict[str, str]:
+    """The files that volumes name, and of each the path of the key that names it first."""
+    found: dict[str, str] = {}
+    for name, each in volumes_of(objects).items():
+        found.setdefault(each.file, f"objects.{name}.file")
+    return found
+
+
+def with_grids(objects: Mapping[str, ObjectBase], names: Mapping[str, str]) -> dict[str, ObjectBase]:
+    """The objects with other names of their files; those without any are the same."""
+    result = dict(objects)
+    for name, each in volumes_of(objects).items():
+        if names.get(each.file, each.file) != each.file:
+            result[name] = each.model_copy(update={"file": names[each.file]})
+    return result
