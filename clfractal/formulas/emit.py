@@ -18,7 +18,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Literal, TypeGuard
 
-from clfractal.formulas.evaluate import evaluate_constant
+from clfractal.formulas.evaluate import call_float, evaluate_constant
 from clfractal.formulas.nodes import COMPARISONS, Call, Name, Node, Number, names_in, substitute
 from clfractal.formulas.products import Value, literal, power_over_root, whole_complex_power, whole_power
 
@@ -114,21 +114,12 @@ class Emitter:
         if function in _COMPLEX_POWERS:
             re, im = self._complex_power(*operands)
             return re if function == "cpow_re" else im
-        if function in ("min", "max") and len(operands) > 2:
-            head = operands[0]
-            for operand in operands[1:]:
-                head = self._operation(function, head, operand)
-            return head
-        return self._operation(function, *operands)
+        return self.combine(function, *operands)
 
     def _binding(self, name: str) -> Value:
         if name not in self.bindings and name in self.lets:
             self.bindings[name] = self.emit(self.lets[name])
         return self.bindings[name]
-
-    def combine(self, function: str, *operands: Value) -> Value:
-        """One more operation on values that are there already."""
-        return self._operation(function, *operands)
 
     def radicand(self, value: Value) -> Value | None:
         """x for a value that was computed as sqrt(x), else None."""
@@ -183,8 +174,8 @@ class Emitter:
         """The value as a number of the full type."""
         return value.text if value.kind == "varying" else f"dual_constant({value.text})"
 
-    def _operation(self, function: str, *operands: Value) -> Value:
-        """One operation, in the cheapest form that its operands' kinds allow."""
+    def combine(self, function: str, *operands: Value) -> Value:
+        """One operation on values that are there, in the cheapest form that their kinds allow."""
         a = operands[0]
         b = operands[1] if len(operands) > 1 else None
         if function == "neg" and a.number is not None:
@@ -196,11 +187,11 @@ class Emitter:
             square = self.radicand(b)
             if square is not None:
                 # One operation for 1/sqrt(x): shorter to wait for than a root and a division in turn.
-                return self._operation("rsqrt", square)
+                return self.combine("rsqrt", square)
         if function == "div" and b is not None and b.kind == "constant" and b.number != 0:
             # The host divides once; the kernel multiplies.
             inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))))
-            return self._operation("mul", a, inverse)
+            return self.combine("mul", a, inverse)
         result = self._call(function, operands)
         self.origins.setdefault(result.text, (function, operands))
         return result
@@ -237,7 +228,7 @@ class Emitter:
         if function == "add":
             return b if a.number == 0 else a if b.number == 0 else None
         if function == "sub":
-            return a if b.number == 0 else self._operation("neg", b) if a.number == 0 else None
+            return a if b.number == 0 else self.combine("neg", b) if a.number == 0 else None
         if function == "mul":
             if 0 in (a.number, b.number):
                 return literal(0.0)
@@ -249,21 +240,19 @@ class Emitter:
         n = exponent.number
         if n is not None and n == math.floor(n) and abs(n) <= _WHOLE:
             if n < 0:
-                return self._operation("div", literal(1.0), whole_power(self._operation, base, int(-n)))
-            return whole_power(self._operation, base, int(n)) if n > 0 else literal(1.0)
+                return self.combine("div", literal(1.0), whole_power(self.combine, base, int(-n)))
+            return whole_power(self.combine, base, int(n)) if n > 0 else literal(1.0)
         if n is not None and n + 0.5 == math.floor(n + 0.5) and 0 < n <= _WHOLE:
             # A half more than a whole power is that power times the square root.
-            root = self._operation("sqrt", base)
-            return (
-                root if n == 0.5 else self._operation("mul", whole_power(self._operation, base, int(n)), root)
-            )
+            root = self.combine("sqrt", base)
+            return root if n == 0.5 else self.combine("mul", whole_power(self.combine, base, int(n)), root)
         if exponent.node is not None and n is None:
             return self._raised(base, exponent)
         if self.number_type == "dual" and base.kind == "varying" and exponent.kind != "varying":
             return self._statement("dual", "varying", "dual_pow_real", base.text, exponent.text)
         if self.number_type == "dual" and "varying" in (base.kind, exponent.kind):
             return self._statement("dual", "varying", "dual_pow", self._lift(base), self._lift(exponent))
-        return self._operation("pow", base, exponent)
+        return self.combine("pow", base, exponent)
 
     def _raised(self, base: Value, exponent: Value) -> Value:
         """base ** exponent where the exponent is data; see `kernels/formulas/numbers/powers.h`."""
@@ -296,23 +285,21 @@ class Emitter:
         if n == math.floor(n) and 0 < abs(n) <= _WHOLE:
             square = self._square_of_root(y)
             if square is None:
-                re, im = whole_complex_power(self._operation, x, y, int(abs(n)))
+                re, im = whole_complex_power(self.combine, x, y, int(abs(n)))
             else:
-                re, share = power_over_root(self._operation, x, square, int(abs(n)))
-                im = self._operation("mul", share, y)
+                re, share = power_over_root(self.combine, x, square, int(abs(n)))
+                im = self.combine("mul", share, y)
             if n > 0:
                 return re, im
             two = literal(2.0)
-            square = self._operation("add", self._power(re, two), self._power(im, two))
-            return self._operation("div", re, square), self._operation(
-                "neg", self._operation("div", im, square)
-            )
-        square = self._operation("add", self._operation("mul", x, x), self._operation("mul", y, y))
+            square = self.combine("add", self._power(re, two), self._power(im, two))
+            return self.combine("div", re, square), self.combine("neg", self.combine("div", im, square))
+        square = self.combine("add", self.combine("mul", x, x), self.combine("mul", y, y))
         modulus = self._power(square, literal(n / 2))
-        angle = self._operation("mul", self._operation("atan2", y, x), exponent)
+        angle = self.combine("mul", self.combine("atan2", y, x), exponent)
         return (
-            self._operation("mul", modulus, self._operation("cos", angle)),
-            self._operation("mul", modulus, self._operation("sin", angle)),
+            self.combine("mul", modulus, self.combine("cos", angle)),
+            self.combine("mul", modulus, self.combine("sin", angle)),
         )
 
     def _square_of_root(self, y: Value) -> Value | None:
@@ -320,7 +307,7 @@ class Emitter:
         square = self.radicand(y)
         if square is not None and not self._never_negative(square):
             # The root of a negative number is 0, and so is its square.
-            square = self._operation("max", square, literal(0.0))
+            square = self.combine("max", square, literal(0.0))
         return square
 
     def _raised_complex(self, x: Value, y: Value, exponent: Value) -> tuple[Value, Value]:
@@ -453,6 +440,10 @@ class Emitter:
         self.origins.setdefault(result.text, ("where", (Value(chosen, "flat"), a, b)))
         return result
 
+    def choose_above(self, limit: str, a: Value, slope: Value) -> Value:
+        """A slope in the lanes where `a` is above a limit, else 0."""
+        return self.choose(f"less({limit}, {a.text})", slope, literal(0.0))
+
     def _condition(self, node: Node) -> str | bool:
         """A condition as the text of a mask, or its truth when it is known now."""
         assert isinstance(node, Call)
@@ -473,9 +464,7 @@ class Emitter:
         assert node.function in COMPARISONS
         a, b = (self.emit(argument) for argument in node.arguments)
         if a.number is not None and b.number is not None:
-            p, q = a.number, b.number
-            truths = {"lt": p < q, "le": p <= q, "gt": p > q, "ge": p >= q, "eq": p == q, "ne": p != q}
-            return truths[node.function]
+            return bool(call_float(node.function, [a.number, b.number]))
         radicand = self.radicand(a)
         if radicand is not None and b.number == 0 and node.function in ("gt", "eq", "ne"):
             # The root need not be waited for. It is 0 for x < 0 too: sqrt(x) > 0 and sqrt(x) != 0 where x > 0.

@@ -25,18 +25,18 @@ class Facts:
     has_shape: bool
     has_calls: bool
 
-    def text(self) -> str:
-        """As defines."""
-        return (
-            "#define JOINED 0\n"
-            f"#define STATE_SIZE {self.size}\n"
-            f"#define FIRST_COUNT {self.first_count}\n"
-            f"#define LOGARITHMIC {int(self.logarithmic)}\n"
-            f"#define HAS_DERIVATIVE {int(self.has_derivative)}\n"
-            f"#define HAS_SHAPE {int(self.has_shape)}\n"
-            f"#define HAS_CALLS {int(self.has_calls)}\n"
-            f"{each_usual(1)}"
-        )
+    def defines(self, **others: object) -> str:
+        """As defines, of which some have other values."""
+        values: dict[str, object] = {
+            "JOINED": 0,
+            "STATE_SIZE": self.size,
+            "FIRST_COUNT": self.first_count,
+            "LOGARITHMIC": int(self.logarithmic),
+            "HAS_DERIVATIVE": int(self.has_derivative),
+            "HAS_SHAPE": int(self.has_shape),
+            "HAS_CALLS": int(self.has_calls),
+        }
+        return "".join(f"#define {name} {value}\n" for name, value in {**values, **others}.items())
 
 
 def each_usual(formulas: int) -> str:

@@ -19,7 +19,7 @@ from typing import Any, Literal
 from clfractal.formulas.costs import cost_of
 from clfractal.formulas.emit import Constants, Emitter, NumberType
 from clfractal.formulas.evaluate import as_function, evaluate_constant, finite
-from clfractal.formulas.functions import Facts, state_functions
+from clfractal.formulas.functions import Facts, each_usual, state_functions
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.products import Value, literal
@@ -50,11 +50,6 @@ class FormulaText:
     text: str
     constants: tuple[float, ...]
     facts: Facts
-
-    @property
-    def logarithmic(self) -> bool:
-        """The degree is above 1, so that distances follow |z| log|z|."""
-        return self.facts.logarithmic
 
     @property
     def has_derivative(self) -> bool:
@@ -207,7 +202,7 @@ class _ChainWriter:
             self.chain.shape_index is not None,
             any(map(_CALLS.search, parts)),
         )
-        head = [facts.text(), state_functions(self.width)] if self.leaf is None else []
+        head = [facts.defines() + each_usual(1), state_functions(self.width)] if self.leaf is None else []
         return _Written(
             _one("\n".join([*head, *parts]) + "\n"),
             facts,

@@ -12,7 +12,7 @@ import re
 import warnings
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import replace
-from typing import NoReturn
+from typing import Any, NoReturn
 
 from clfractal.errors import FormulaError, Where, unknown_name
 from clfractal.formulas.evaluate import MAX_EXPONENT, evaluate
@@ -86,6 +86,13 @@ class _Parser:
         self.text = ""
         self.offset = 0
         self.nodes = 0
+        self._readers: Mapping[type[ast.expr], Callable[[Any, int, int], Node]] = {
+            ast.UnaryOp: self._unary,
+            ast.BinOp: self._binary,
+            ast.BoolOp: self._boolean,
+            ast.Compare: self._compare,
+            ast.Call: self._call,
+        }
 
     def fail(self, message: str, position: int = 0) -> NoReturn:
         """Raises the error, pointing at a column of the text (0: at the text as a whole)."""
@@ -168,19 +175,10 @@ class _Parser:
             return self._number(tree.value, position)
         if isinstance(tree, ast.Name):
             return self._name(tree.id, position)
-        if isinstance(tree, ast.UnaryOp):
-            return self._unary(tree, position, depth)
-        if isinstance(tree, ast.BinOp):
-            return self._binary(tree, position, depth)
-        if isinstance(tree, ast.BoolOp):
-            operator = "and" if isinstance(tree.op, ast.And) else "or"
-            parts = [self._condition(part, depth + 1, f"'{operator}'") for part in tree.values]
-            return self._fold(operator, parts, position, depth)
-        if isinstance(tree, ast.Compare):
-            return self._compare(tree, position, depth)
-        if isinstance(tree, ast.Call):
-            return self._call(tree, position, depth)
-        return self.fail(_HINTS.get(type(tree), "is not part of the language"), position)
+        read: Callable[[Any, int, int], Node] | None = self._readers.get(type(tree))
+        if read is None:
+            self.fail(_HINTS.get(type(tree), "is not part of the language"), position)
+        return read(tree, position, depth)
 
     def _number(self, value: object, position: int) -> Number:
         if isinstance(value, bool) or not isinstance(value, (int, float)):
@@ -238,6 +236,11 @@ class _Parser:
             position,
         )
         return self._checked(node)
+
+    def _boolean(self, tree: ast.BoolOp, position: int, depth: int) -> Node:
+        operator = "and" if isinstance(tree.op, ast.And) else "or"
+        parts = [self._condition(part, depth + 1, f"'{operator}'") for part in tree.values]
+        return self._fold(operator, parts, position, depth)
 
     def _checked(self, node: Call) -> Call:
         """Refuses a division by a constant zero and an exponent that no number survives."""
@@ -306,18 +309,19 @@ def _constant(node: Node) -> float | None:
     return float(value)
 
 
+_KINDS: tuple[tuple[tuple[type, ...], str], ...] = (
+    ((type(None),), "nothing"),
+    ((complex,), "an imaginary number"),
+    ((str, bytes), "a text"),
+    ((list, tuple), "a list"),
+    ((dict,), "a mapping"),
+)
+
+
 def _kind(value: object) -> str:
-    if value is None:
-        return "nothing"
     if isinstance(value, bool):
         return "true" if value else "false"
-    if isinstance(value, complex):
-        return "an imaginary number"
-    if isinstance(value, (str, bytes)):
-        return "a text"
-    if isinstance(value, (list, tuple)):
-        return "a list"
-    return "a mapping" if isinstance(value, dict) else "something else"
+    return next((words for types, words in _KINDS if isinstance(value, types)), "something else")
 
 
 def _excerpt(text: str, position: int) -> str:

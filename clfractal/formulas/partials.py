@@ -8,6 +8,8 @@ as in `kernels/formulas/numbers/dual.h`.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+
 from clfractal.formulas.emit import Emitter
 from clfractal.formulas.products import Value, literal
 
@@ -52,44 +54,10 @@ class Differentiator:
         if all(partial is None for partial in partials):
             return None
         if len(operands) == 1:
-            return self._times(self._slope(function, operands[0], value), partials[0])
+            return self._times(_SLOPES[function](self.emitter, operands[0], value), partials[0])
         if function == "clamp":
             return self._clamp(operands, partials)
         return self._binary(function, operands[0], operands[1], partials[0], partials[1], value)
-
-    # --- functions of one number ---
-
-    def _slope(self, function: str, a: Value, value: Value) -> Value:
-        """The derivative of a function of one number at `a`, where its value is `value`."""
-        do = self.emitter.combine
-        if function == "neg":
-            return literal(-1.0)
-        if function == "abs":
-            return do("sign", a)
-        if function == "sqrt":
-            half = do("mul", do("rsqrt", a), _HALF)
-            return self.emitter.choose(f"less(R(0.0), {a.text})", half, literal(0.0))
-        if function == "rsqrt":
-            return do("mul", do("mul", value, literal(-0.5)), do("mul", value, value))
-        if function == "exp":
-            return value
-        if function == "log":
-            return self.emitter.choose(
-                f"less((real)(LOG_SMALLEST), {a.text})", do("div", _ONE, a), literal(0.0)
-            )
-        if function == "sin":
-            return do("cos", a)
-        if function == "cos":
-            return do("neg", do("sin", a))
-        if function == "tan":
-            return do("add", do("mul", value, value), _ONE)
-        if function == "atan":
-            return do("div", _ONE, do("add", do("mul", a, a), _ONE))
-        if function in ("asin", "acos"):
-            slope = do("arc_slope", a)
-            return slope if function == "asin" else do("neg", slope)
-        assert function in ("sign", "floor"), function
-        return literal(0.0)
 
     # --- functions of two ---
 
@@ -115,9 +83,7 @@ class Differentiator:
             return self._sum(da, self._times(do("neg", turns), db))
         if function == "atan2":
             square = do("add", do("mul", a, a), do("mul", b, b))
-            inverse = self.emitter.choose(
-                f"less(R(0.0), {square.text})", do("div", _ONE, square), literal(0.0)
-            )
+            inverse = self.emitter.choose_above("R(0.0)", square, do("div", _ONE, square))
             by_a = self._times(do("mul", b, inverse), da)
             by_b = self._times(do("neg", do("mul", a, inverse)), db) if db is not None else None
             return self._sum(by_a, by_b)
@@ -134,7 +100,7 @@ class Differentiator:
         if dx is None and dy is None:
             return None
         square = do("add", do("mul", x, x), self.emitter.radicand(y) or do("mul", y, y))
-        share = self.emitter.choose(f"less(R(0.0), {square.text})", do("div", exponent, square), literal(0.0))
+        share = self.emitter.choose_above("R(0.0)", square, do("div", exponent, square))
         u = do("mul", do("add", do("mul", re, x), do("mul", im, y)), share)
         v = do("mul", do("sub", do("mul", im, x), do("mul", re, y)), share)
         if function == "cpow_re":
@@ -168,3 +134,28 @@ class Differentiator:
         if yes is None and no is None:
             return None
         return self.emitter.choose(mask, yes or literal(0.0), no or literal(0.0))
+
+
+# The derivatives of functions of one number, by what it is and what the function gives.
+_SLOPES: Mapping[str, Callable[[Emitter, Value, Value], Value]] = {
+    "neg": lambda emit, a, value: literal(-1.0),
+    "abs": lambda emit, a, value: emit.combine("sign", a),
+    "sqrt": lambda emit, a, value: emit.choose_above(
+        "R(0.0)", a, emit.combine("mul", emit.combine("rsqrt", a), _HALF)
+    ),
+    "rsqrt": lambda emit, a, value: emit.combine(
+        "mul", emit.combine("mul", value, literal(-0.5)), emit.combine("mul", value, value)
+    ),
+    "exp": lambda emit, a, value: value,
+    "log": lambda emit, a, value: emit.choose_above("(real)(LOG_SMALLEST)", a, emit.combine("div", _ONE, a)),
+    "sin": lambda emit, a, value: emit.combine("cos", a),
+    "cos": lambda emit, a, value: emit.combine("neg", emit.combine("sin", a)),
+    "tan": lambda emit, a, value: emit.combine("add", emit.combine("mul", value, value), _ONE),
+    "atan": lambda emit, a, value: emit.combine(
+        "div", _ONE, emit.combine("add", emit.combine("mul", a, a), _ONE)
+    ),
+    "asin": lambda emit, a, value: emit.combine("arc_slope", a),
+    "acos": lambda emit, a, value: emit.combine("neg", emit.combine("arc_slope", a)),
+    "sign": lambda emit, a, value: literal(0.0),
+    "floor": lambda emit, a, value: literal(0.0),
+}

@@ -86,24 +86,13 @@ def _name(leaf: int) -> str:
 
 def _facts(each: list[Facts]) -> str:
     """The facts as defines: what is not the same of all formulas stands in the record of each."""
-    first = each[0]
-    values: dict[str, object] = {
-        "JOINED": 1,
-        "STATE_SIZE": first.size,
-        "FIRST_COUNT": first.first_count,
-        "LOGARITHMIC": int(first.logarithmic),
-        "HAS_DERIVATIVE": int(first.has_derivative),
-        "HAS_SHAPE": int(first.has_shape),
-        # Orbits of several solids do not run side by side.
-        "HAS_CALLS": 1,
+    differing = {
+        name.upper(): f"(orbit->{name})"
+        for name in ("first_count", "logarithmic", "has_shape")
+        if len({getattr(facts, name) for facts in each}) > 1
     }
-    if any(facts.first_count != first.first_count for facts in each):
-        values["FIRST_COUNT"] = "(orbit->first_count)"
-    if any(facts.logarithmic != first.logarithmic for facts in each):
-        values["LOGARITHMIC"] = "(orbit->logarithmic)"
-    if any(facts.has_shape != first.has_shape for facts in each):
-        values["HAS_SHAPE"] = "(orbit->has_shape)"
-    return "".join(f"#define {name} {value}\n" for name, value in values.items())
+    # (Orbits of several solids do not run side by side, so the last one is of no account.)
+    return each[0].defines(JOINED=1, HAS_CALLS=1, **differing)
 
 
 def _usual(leaves: int) -> str:

@@ -238,7 +238,7 @@ def test_a_degree_of_1_and_an_infinite_f0_are_texts_of_their_own() -> None:
 
     one, more, most = (written(p, degree="p") for p in (1, 1.5, 3))
     assert more.text is most.text
-    assert (one.logarithmic, more.logarithmic) == (False, True)
+    assert (one.facts.logarithmic, more.facts.logarithmic) == (False, True)
     start = {"map": ["x*x - y*y + p**-1", "2*x*y", "z*z"]}
     assert "#define FIRST_COUNT 1" in written(0.5, **start).text
     assert written(0.5, **start).constants[0] == 2.0

@@ -12,7 +12,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.scene.model import Scene
-from clfractal.scene.object_grids import placed, volumes_of
+from clfractal.scene.named_files import volumes_of
+from clfractal.scene.object_grids import placed
 from tests import scenes
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import Floats, rays, shoot, stacked

@@ -12,7 +12,8 @@ from clfractal.scene import objects
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
-from clfractal.scene.object_grids import placed, volumes_of
+from clfractal.scene.named_files import volumes_of
+from clfractal.scene.object_grids import placed
 from clfractal.scene.objects import MAX_VOLUMES
 from tests.render.objects_oracle import rotation_of
 from tests.render.volumes import keep, value_at
