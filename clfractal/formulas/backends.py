@@ -194,6 +194,30 @@ class DualBackend:
 
     def __init__(self, base: Backend) -> None:
         self.base = base
+        do, guarded = self._base, self._guarded
+        # The derivatives by each argument, of the arguments' values and the function's own.
+        self._slopes: Mapping[str, Callable[[list[Any], Any], tuple[Any, ...]]] = {
+            "add": lambda v, value: (1.0, 1.0),
+            "sub": lambda v, value: (1.0, -1.0),
+            "mul": lambda v, value: (v[1], v[0]),
+            "div": lambda v, value: (do("div", 1.0, v[1]), do("neg", do("div", value, v[1]))),
+            "pow": lambda v, value: self._power_slopes(v[0], v[1], value),
+            "neg": lambda v, value: (-1.0,),
+            "abs": lambda v, value: (do("sign", v[0]),),
+            "sqrt": lambda v, value: (guarded(do("gt", v[0], 0.0), lambda: do("div", 0.5, value)),),
+            "exp": lambda v, value: (value,),
+            "log": lambda v, value: (guarded(do("gt", v[0], TINY), lambda: do("div", 1.0, v[0])),),
+            "sin": lambda v, value: (do("cos", v[0]),),
+            "cos": lambda v, value: (do("neg", do("sin", v[0])),),
+            "tan": lambda v, value: (do("add", 1.0, do("mul", value, value)),),
+            "asin": lambda v, value: self._arc_slope(v[0], 1.0),
+            "acos": lambda v, value: self._arc_slope(v[0], -1.0),
+            "atan": lambda v, value: (do("div", 1.0, do("add", 1.0, do("mul", v[0], v[0]))),),
+            "atan2": lambda v, value: self._arctangent_slopes(v[0], v[1]),
+            "mod": lambda v, value: (1.0, do("neg", do("floor", do("div", v[0], v[1])))),
+            "cpow_re": lambda v, value: self._complex_power_slopes("cpow_re", v),
+            "cpow_im": lambda v, value: self._complex_power_slopes("cpow_im", v),
+        }
 
     def call(self, function: str, arguments: list[Any]) -> Any:
         """The function's value: a Dual, or a number of the base where nothing varies."""
@@ -209,7 +233,7 @@ class DualBackend:
         if function == "clamp":
             return self.call("min", [self.call("max", [arguments[0], arguments[1]]), arguments[2]])
         value = self._base(function, *values)
-        slopes = self._slopes(function, values, value)
+        slopes = self._slopes[function](values, value)
         partials = [
             self._sum([self._base("mul", slopes[i], a.partials[j]) for i, a in varying])
             for j in range(len(varying[0][1].partials))
@@ -248,30 +272,18 @@ class DualBackend:
             return slope() if condition else 0.0
         return self._base("where", condition, slope(), 0.0)
 
-    def _slopes(self, function: str, v: list[Any], value: Any) -> tuple[Any, ...]:
-        """The derivative by each argument."""
-        base = self._base
-        if function in ("cpow_re", "cpow_im"):
-            return self._complex_power_slopes(function, v)
-        if function == "pow":
-            return self._power_slopes(v[0], v[1], value)
-        if function == "atan2":
-            square = base("add", base("mul", v[0], v[0]), base("mul", v[1], v[1]))
-            outside = base("gt", square, 0.0)
-            return (
-                self._guarded(outside, lambda: base("div", v[1], square)),
-                self._guarded(outside, lambda: base("neg", base("div", v[0], square))),
-            )
-        if function == "sqrt":
-            return (self._guarded(base("gt", v[0], 0.0), lambda: base("div", 0.5, value)),)
-        if function == "log":
-            return (self._guarded(base("gt", v[0], TINY), lambda: base("div", 1.0, v[0])),)
-        if function in ("asin", "acos"):
-            square = base("mul", base("sub", 1.0, v[0]), base("add", 1.0, v[0]))
-            unit = 1.0 if function == "asin" else -1.0
-            root = base("sqrt", square)
-            return (self._guarded(base("gt", square, 0.0), lambda: base("div", unit, root)),)
-        return _SLOPES[function](base, v, value)
+    def _arctangent_slopes(self, y: Any, x: Any) -> tuple[Any, Any]:
+        square = self._base("add", self._base("mul", y, y), self._base("mul", x, x))
+        outside = self._base("gt", square, 0.0)
+        return (
+            self._guarded(outside, lambda: self._base("div", x, square)),
+            self._guarded(outside, lambda: self._base("neg", self._base("div", y, square))),
+        )
+
+    def _arc_slope(self, x: Any, sign: float) -> tuple[Any]:
+        square = self._base("mul", self._base("sub", 1.0, x), self._base("add", 1.0, x))
+        root = self._base("sqrt", square)
+        return (self._guarded(self._base("gt", square, 0.0), lambda: self._base("div", sign, root)),)
 
     def _power_slopes(self, x: Any, y: Any, value: Any) -> tuple[Any, Any]:
         by_base = self._finite(self._base("mul", y, self._base("pow", x, self._base("sub", y, 1.0))))
@@ -288,21 +300,6 @@ class DualBackend:
 
 
 _TRUTH = frozenset(("lt", "le", "gt", "ge", "eq", "ne", "and", "or", "not"))
-_Base = Callable[..., Any]
-_SLOPES: Mapping[str, Callable[[_Base, list[Any], Any], tuple[Any, ...]]] = {
-    "add": lambda base, v, value: (1.0, 1.0),
-    "sub": lambda base, v, value: (1.0, -1.0),
-    "mul": lambda base, v, value: (v[1], v[0]),
-    "div": lambda base, v, value: (base("div", 1.0, v[1]), base("neg", base("div", value, v[1]))),
-    "neg": lambda base, v, value: (-1.0,),
-    "abs": lambda base, v, value: (base("sign", v[0]),),
-    "exp": lambda base, v, value: (value,),
-    "sin": lambda base, v, value: (base("cos", v[0]),),
-    "cos": lambda base, v, value: (base("neg", base("sin", v[0])),),
-    "tan": lambda base, v, value: (base("add", 1.0, base("mul", value, value)),),
-    "atan": lambda base, v, value: (base("div", 1.0, base("add", 1.0, base("mul", v[0], v[0]))),),
-    "mod": lambda base, v, value: (1.0, base("neg", base("floor", base("div", v[0], v[1])))),
-}
 
 
 def constant_dual(value: Any, count: int) -> Dual:

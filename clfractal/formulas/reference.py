@@ -7,7 +7,8 @@ this.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import count, islice
 from typing import Any
 
 import numpy as np
@@ -228,17 +229,8 @@ def mp_orbit(
     import mpmath
 
     with mpmath.workdps(digits):
-        backend = MpmathBackend()
-        here = [mpmath.mpf(p) for p in point]
-        c = [mpmath.mpf(p) for p in space_to_state(chain, here, backend)]
-        state: list[Any] = [mpmath.mpf(0)] * chain.size if chain.add == "point" else c
-        states = [tuple(state)]
-        for application in range(applications):
-            bound = chain.link_at(application).bound
-            constant = [mpmath.mpf(p) for p in constant_of(bound, c)]
-            state = [mpmath.mpf(z) for z in apply(bound, state, constant, backend)]
-            states.append(tuple(state))
-    return states
+        states = _mp_states(chain, map(mpmath.mpf, point), MpmathBackend(), mpmath.mpf)
+        return [tuple(state) for state in islice(states, applications + 1)]
 
 
 def mp_escape(chain: Chain, point: Sequence[Any], iterations: int, digits: int = 40) -> tuple[int, bool]:
@@ -246,17 +238,11 @@ def mp_escape(chain: Chain, point: Sequence[Any], iterations: int, digits: int =
     import mpmath
 
     with mpmath.workdps(digits):
-        backend = MpmathBackend()
-        c = [mpmath.mpf(p) for p in space_to_state(chain, [mpmath.mpf(p) for p in point], backend)]
-        state: list[Any] = [mpmath.mpf(0)] * chain.size if chain.add == "point" else c
         limit = mpmath.mpf(chain.bailout) ** 2
-        for application in range(iterations + 1):
-            square = mpmath.fsum(z * z for z in state)
-            if not square <= limit:
+        states = _mp_states(chain, map(mpmath.mpf, point), MpmathBackend(), mpmath.mpf)
+        for application, state in enumerate(islice(states, iterations + 1)):
+            if not mpmath.fsum(z * z for z in state) <= limit:
                 return application, False
-            if application < iterations:
-                bound = chain.link_at(application).bound
-                state = apply(bound, state, [mpmath.mpf(p) for p in constant_of(bound, c)], backend)
     return iterations, True
 
 
@@ -265,15 +251,22 @@ def mp_jacobian(chain: Chain, point: Sequence[Any], applications: int, digits: i
     import mpmath
 
     with mpmath.workdps(digits):
-        backend = DualBackend(MpmathBackend())
         here = seeded([mpmath.mpf(p) for p in point])
-        c = [_mp_dual(p) for p in space_to_state(chain, here, backend)]
-        state: list[Any] = [_mp_dual(0.0)] * chain.size if chain.add == "point" else c
-        for application in range(applications):
-            bound = chain.link_at(application).bound
-            constant = [_mp_dual(p) for p in constant_of(bound, c)]
-            state = [_mp_dual(z) for z in apply(bound, state, constant, backend)]
+        *_, state = islice(_mp_states(chain, here, DualBackend(MpmathBackend()), _mp_dual), applications + 1)
         return [list(z.partials) for z in state]
+
+
+def _mp_states(
+    chain: Chain, point: Iterable[Any], backend: Backend, number: Callable[[Any], Any]
+) -> Iterator[list[Any]]:
+    """The states after 0, 1, ... applications, without end; `number` makes a constant one of theirs."""
+    c = [number(p) for p in space_to_state(chain, list(point), backend)]
+    state = [number(0.0)] * chain.size if chain.add == "point" else c
+    for application in count():
+        yield state
+        bound = chain.link_at(application).bound
+        constant = [number(p) for p in constant_of(bound, c)]
+        state = [number(z) for z in apply(bound, state, constant, backend)]
 
 
 def _mp_dual(value: Any) -> Dual:
