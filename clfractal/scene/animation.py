@@ -2,11 +2,11 @@
 
 import re
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self, TypeAlias
+from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag
 
-from clfractal.schema.base import Number, Section, chosen_by_list, problem
+from clfractal.schema.base import Number, Section, chosen_by_list, problem, rule
 from clfractal.schema.hex_color import AlsoAs
 
 MAX_FRAMES = 1_000_000
@@ -55,13 +55,12 @@ class Key(Section):
         description="for bezier: the inner points of a curve from (0, 0), this key, to (1, 1), the next: x1, y1, x2, y2",
     )
 
-    @model_validator(mode="after")
-    def _once(self) -> Self:
+    @rule
+    def _once(self) -> None:
         if (self.frame is None) == (self.time is None):
             raise problem("needs frame or time" if self.frame is None else "needs one of frame and time")
         if self.handles is not None and self.interpolation not in (None, "bezier"):
             raise problem(f"applies to bezier, not to {self.interpolation}", "handles")
-        return self
 
     @property
     def values(self) -> tuple[float, ...]:
@@ -95,18 +94,17 @@ class Track(Section):
         description="of a camera's position: direction and distance from the target move, not the place; null: if smooth",
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @rule
+    def _one_source(self) -> None:
         given = [name for name in ("keys", "expression", "file") if getattr(self, name) is not None]
         if len(given) != 1:
             got = f", got {' and '.join(given)}" if given else ""
             raise problem(f"needs one of keys, expression and file{got}")
         if (self.file is None) != (self.column is None):
             raise problem("needs file and column together", "column" if self.file is None else "file")
-        return self
 
-    @model_validator(mode="after")
-    def _in_one_shape(self) -> Self:
+    @rule
+    def _in_one_shape(self) -> None:
         for index, key in enumerate(self.keys or ()):
             assert self.keys is not None
             if len(key.values) != len(self.keys[0].values):
@@ -116,7 +114,6 @@ class Track(Section):
             last = index == len(self.keys) - 1
             if (key.interpolation or self.interpolation) == "bezier" and key.handles is None and not last:
                 raise problem("needs handles: [x1, y1, x2, y2], as for bezier", ("keys", index))
-        return self
 
 
 _SECONDS = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|min)\s*")
@@ -182,18 +179,17 @@ class Animation(Section):
         {}, description="values that move, by their dotted keys, such as `camera.position`"
     )
 
-    @model_validator(mode="after")
-    def _has_a_length(self) -> Self:
+    @rule
+    def _has_a_length(self) -> None:
         if (self.frames is None) == (self.duration is None):
             raise problem("needs one of frames and duration")
         if self.duration is not None and self.duration * self.fps > MAX_FRAMES:
             raise problem(f"must be at most {MAX_FRAMES:,} frames", "duration")
         if self.frame is not None and self.frame > self.count - (not self.loop):
             raise problem(f"must be one of the frames 0 to {self.count - 1}, got {self.frame:g}", "frame")
-        return self
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    @rule
+    def _in_order(self) -> None:
         for name, track in self.tracks.items():
             keys = track.keys or ()
             for index in range(1, len(keys)):
@@ -204,7 +200,6 @@ class Animation(Section):
                         f"must come after the key before it: frame {after:g} is {word} frame {before:g}",
                         ("tracks", name, "keys", index),
                     )
-        return self
 
     @property
     def count(self) -> int:

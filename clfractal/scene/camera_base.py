@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
 from clfractal.schema.base import (
@@ -18,6 +18,7 @@ from clfractal.schema.base import (
     length,
     minus,
     problem,
+    rule,
 )
 from clfractal.schema.fields import SCALE
 
@@ -85,8 +86,8 @@ class CameraBase(Section):
         default=None, exclude=True, description="shifts camera and target along the camera's own axes"
     )
 
-    @model_validator(mode="after")
-    def _stands_somewhere(self) -> Self:
+    @rule
+    def _stands_somewhere(self) -> None:
         if _SAID not in self.__dict__:  # this is asked again of a camera that is put into another scene
             self._remember({name: getattr(self, name) for name in (*PLACE, *WORDS, "frame")})
         if self.orbit is None or not self.orbit.complete:
@@ -99,7 +100,6 @@ class CameraBase(Section):
         if self.frame is None:
             # (Otherwise the scene does it, which knows the bounds.)
             self._take_shift()
-        return self
 
     def framed(self, shown: Extent, aspect: float) -> Self:
         """The camera with its `frame` and `shift` done.

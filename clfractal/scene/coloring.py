@@ -1,10 +1,10 @@
 """Where the surface's colour comes from: a quantity and a palette."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Coordinate, Length, problem
+from clfractal.schema.base import Coordinate, Length, problem, rule
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
 from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
@@ -50,8 +50,7 @@ class Coloring(ByQuantity):
         """What chooses the colour."""
         return coloring_kind(self.by)
 
-    @model_validator(mode="after")
-    def _has_a_way(self) -> Self:
+    @rule
+    def _has_a_way(self) -> None:
         if "along" in self.kind.keys and self.along not in self.kind.ways:
             raise problem(f"must be {' or '.join(self.kind.ways)} for {self.by}, got {self.along}", "along")
-        return self

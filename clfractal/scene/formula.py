@@ -1,10 +1,10 @@
 """The scene's `formula`: which formula is drawn, and the values of its parameters."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Coordinate, Number, Section, problem
+from clfractal.schema.base import Coordinate, Number, Section, problem, rule
 from clfractal.schema.fields import PLACE, WHOLE, Usual
 
 MAX_LINKS = 64
@@ -46,12 +46,11 @@ class ChainLink(_Source):
         description="first application in which it no longer takes part; null: it goes on to the end",
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @rule
+    def _one_source(self) -> None:
         _check_source(self, ("name", "file", "inline"))
         if self.stop is not None and self.stop <= self.start:
             raise problem(f"must be above start, {self.start}, got {self.stop}", "stop")
-        return self
 
 
 class FormulaSpec(_Source):
@@ -70,14 +69,13 @@ class FormulaSpec(_Source):
         None, description="escape radius for distances; null: the formula's own, or 1000"
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @rule
+    def _one_source(self) -> None:
         _check_source(self, ("name", "file", "inline", "chain"))
         if self.chain is not None and self.parameters:
             raise problem("belongs to the members of a chain, not to the chain", "parameters")
         if self.chain is not None and self.live:
             raise problem("belongs to the members of a chain, not to the chain", "live")
-        return self
 
     def mapping(self) -> dict[str, Any]:
         """Plain data with the given keys only; it loads back to an equal FormulaSpec."""

@@ -1,9 +1,9 @@
 """Several views in one picture, as in the thesis's split window."""
 
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
@@ -11,7 +11,7 @@ from clfractal.scene.glow import Glow
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.parts import Background, Camera, Material
 from clfractal.scene.renderer import Renderer
-from clfractal.schema.base import Color, Fraction, Section, problem
+from clfractal.schema.base import Color, Fraction, Section, problem, rule
 
 MAX_VIEWS = 16
 
@@ -48,13 +48,12 @@ class LayoutView(Section):
         None, description="replaces the scene's cut planes; null: keeps them, except for a cut_plane renderer"
     )
 
-    @model_validator(mode="after")
-    def _within(self) -> Self:
+    @rule
+    def _within(self) -> None:
         if self.area is not None:
             left, top, width, height = self.area
             if width <= 0 or height <= 0 or left + width > 1 + 1e-9 or top + height > 1 + 1e-9:
                 raise problem("must lie within the picture, [0, 0, 1, 1], and not be empty", "area")
-        return self
 
     def changes(self) -> dict[str, object]:
         """The sections that the view replaces."""

@@ -1,8 +1,8 @@
 """What lights a scene: lights, an environment, and the fog between the eye and the surface."""
 
-from typing import TYPE_CHECKING, Annotated, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, TypeAlias
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.schema.base import (
     Amount,
@@ -13,6 +13,7 @@ from clfractal.schema.base import (
     Reflectance,
     Section,
     problem,
+    rule,
 )
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import members, one_of
@@ -71,14 +72,13 @@ class Environment(Section):
         """Whether the sun's disc stands before the map."""
         return self.sky is not None and self.sky.sun
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @rule
+    def _one_source(self) -> None:
         given = [key for key in ("name", "file", "sky") if getattr(self, key) is not None]
         if not given:
             raise problem("needs one of name, file or sky")
         if len(given) > 1:
             raise problem(f"cannot be combined with {given[0]}: give one of name, file or sky", given[1])
-        return self
 
 
 class Scattering(Section):

@@ -1,10 +1,10 @@
 """Materials by OpenPBR's names: https://academysoftwarefoundation.github.io/OpenPBR, version 1.1."""
 
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
-from pydantic import Field, create_model, model_validator
+from pydantic import Field, create_model
 
-from clfractal.schema.base import problem
+from clfractal.schema.base import problem, rule
 from clfractal.schema.kinds import members
 from clfractal.schema.mapped import FractionMap, Mapped
 from clfractal.schema.material import Part
@@ -35,16 +35,15 @@ class PbrMaterial(_layers()):  # type: ignore[misc]  # (its parts are what a fol
     )
     mask: FractionMap = Field(0.5, description="of a blend: 0 is the first one, 1 the second")
 
-    @model_validator(mode="after")
-    def _layers_or_blend(self) -> Self:
+    @rule
+    def _layers_or_blend(self) -> None:
         if self.blend is None:
             if self.mask != 0.5:
                 raise problem("applies to a blend of two materials", "mask")
-            return self
+            return
         for part in PARTS:
             if getattr(self, part.tag) != part():
                 raise problem("cannot be combined with blend: a blend takes its layers from others", part.tag)
-        return self
 
 
 Materials = Annotated[dict[MaterialName, PbrMaterial], Field(max_length=MAX_MATERIALS)]

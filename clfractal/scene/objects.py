@@ -1,7 +1,7 @@
 """Objects beside the set, by name: shapes, water, formulas and volumes."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, Any, Literal, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, model_validator
 
@@ -19,6 +19,7 @@ from clfractal.schema.base import (
     cross,
     length,
     problem,
+    rule,
     unit,
 )
 from clfractal.schema.fields import SCALE, Usual
@@ -63,11 +64,10 @@ class WaterObject(Level):
     type: Literal["water"] = "water"
     waves: Waves = Field(default_factory=dict, validate_default=True, description="its waves")
 
-    @model_validator(mode="after")
-    def _travels_somewhere(self) -> Self:
+    @rule
+    def _travels_somewhere(self) -> None:
         if length(cross(unit(self.waves.direction), unit(self.normal))) < 1e-6:
             raise problem("must not be along the normal", "waves.direction")
-        return self
 
 
 def ball_of_both(a: Ball, b: Ball) -> Ball:
@@ -157,13 +157,12 @@ class VolumeObject(ObjectBase):
             raise problem("is not for volumes, which stand beside the set; remove it", "join")
         return values
 
-    @model_validator(mode="after")
-    def _has_one_color(self) -> Self:
+    @rule
+    def _has_one_color(self) -> None:
         if self.transfer.color is not None and not self.is_cloud:
             raise problem("needs opacity, since a surface has its material's color", "transfer.color")
         if self.is_cloud and self.material is not None:
             raise problem("is for surfaces; a cloud, which transfer.opacity makes, has none", "material")
-        return self
 
 
 _KINDS: list[type[ObjectBase]] = [*members("shapes"), WaterObject, FormulaObject, VolumeObject]

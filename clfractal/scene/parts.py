@@ -7,7 +7,7 @@ kind, write its class and add it to the union.
 from math import radians, tan
 from typing import Annotated, Any, Literal, Self, TypeAlias
 
-from pydantic import AfterValidator, BeforeValidator, Field, Tag, model_validator
+from pydantic import AfterValidator, BeforeValidator, Field, Tag
 
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS, ID_CHANNELS, LAYERS, unknown_channel
 from clfractal.files.tone_names import Tone
@@ -23,6 +23,7 @@ from clfractal.schema.base import (
     length,
     minus,
     problem,
+    rule,
 )
 from clfractal.schema.fields import SCALE, Usual
 from clfractal.schema.hex_color import COLOR_SCHEMA, AlsoAs, is_hex, listed
@@ -43,11 +44,10 @@ class Image(Section):
         " size is rendered; null: `height`",
     )
 
-    @model_validator(mode="after")
-    def _bounded(self) -> Self:
+    @rule
+    def _bounded(self) -> None:
         if self.width * self.height > MAX_PIXELS:
             raise problem(f"must be at most {MAX_PIXELS:,} pixels, got {self.width} x {self.height}")
-        return self
 
     @property
     def reference(self) -> float:
@@ -98,20 +98,18 @@ class PerspectiveCamera(CameraBase):
         description="height of the sensor behind the lens, scene units; by default 24 mm if they are metres",
     )
 
-    @model_validator(mode="after")
-    def _focus_in_front(self) -> Self:
+    @rule
+    def _focus_in_front(self) -> None:
         if self.focus_distance is not None and self.focus_distance <= 0:
             raise problem(
                 f"must be in front of the camera: above 0, got {self.focus_distance:g}", "focus_distance"
             )
-        return self
 
-    @model_validator(mode="after")
-    def _focus_once(self) -> Self:
+    @rule
+    def _focus_once(self) -> None:
         if self.measured_focus is not None and self.focus_distance is not None:
             key = "focus_on" if self.focus_on is not None else "focus"
             raise problem("measures the distance that is sharp; remove it, or focus_distance", key)
-        return self
 
     @property
     def measured_focus(self) -> tuple[float, float] | None:
@@ -253,15 +251,14 @@ class Output(Section):
         description="of a JPEG or WebP: the more, the finer and larger; 100: a lossless WebP",
     )
 
-    @model_validator(mode="after")
-    def _different(self) -> Self:
+    @rule
+    def _different(self) -> None:
         for index, channel in enumerate(self.channels):
             if channel in self.channels[:index]:
                 raise problem(f"channel {channel!r} is given twice", f"channels.{index}")
         for name, stored in self.precision.items():
             if name in ID_CHANNELS and stored == "half":
                 raise problem("must be float: numbers of things are exact", f"precision.{name}")
-        return self
 
     @property
     def stops(self) -> float:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Annotated, Literal, Self, TypeVar
+from typing import Annotated, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.schema.base import (
     Angle,
@@ -20,6 +20,7 @@ from clfractal.schema.base import (
     length,
     minus,
     problem,
+    rule,
     turn,
     unit,
 )
@@ -50,12 +51,11 @@ class Transform(Section):
     rotate_y: Angle | None = Field(None, description="rotation about the y axis of space, degrees")
     rotate_z: Angle | None = Field(None, description="rotation about the z axis of space, degrees")
 
-    @model_validator(mode="after")
-    def _one(self) -> Self:
+    @rule
+    def _one(self) -> None:
         given = [name for name in (*MOVES, *TURNS) if getattr(self, name) is not None]
         if len(given) != 1:
             raise problem(f"must have exactly one key of {', '.join((*MOVES, *TURNS))}, got {len(given)}")
-        return self
 
 
 class Plane(Section):
@@ -75,8 +75,8 @@ class Plane(Section):
         (), description="steps that scale, move or rotate the plane, one after the other"
     )
 
-    @model_validator(mode="after")
-    def _faces_somewhere(self) -> Self:
+    @rule
+    def _faces_somewhere(self) -> None:
         if self.corners is not None:
             fields = type(self).model_fields
             for name in ("center", "normal", "up", "width", "height"):
@@ -91,13 +91,12 @@ class Plane(Section):
                 raise problem("must not lie on one line", "corners")
             if abs(dot(side, up)) > 1e-4 * width * height:
                 raise problem("must have a right angle at the first corner, the lower left one", "corners")
-            return self
+            return
         if self.up is not None:
             check_frame(self.normal, self.up)
-        return self
 
-    @model_validator(mode="after")
-    def _stays_near(self) -> Self:
+    @rule
+    def _stays_near(self) -> None:
         for index, plane in enumerate(self._places()):
             first = "corners" if self.corners else "width" if plane.width <= plane.height else "height"
             path = f"transform.{index - 1}" if index else first
@@ -107,7 +106,6 @@ class Plane(Section):
                 raise problem(f"must leave the plane at least {SMALLEST:g} wide and high", path)
             if max(abs(x) for x in plane.center) > LARGEST:
                 raise problem(f"must leave the plane's coordinates below {LARGEST:,.0f}", path)
-        return self
 
     @property
     def placed(self) -> "Placed":

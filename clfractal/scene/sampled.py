@@ -1,11 +1,11 @@
 """Keys that every renderer has: the samples of a pixel, how they are combined, and the number type."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import problem
+from clfractal.schema.base import problem, rule
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import Element
 
@@ -53,11 +53,10 @@ class Sampled(Element):
         "auto", description="number type; auto: float64 where pixels are too fine for float32"
     )
 
-    @model_validator(mode="after")
-    def _enough_samples(self) -> Self:
+    @rule
+    def _enough_samples(self) -> None:
         if self.noise is not None and self.min_samples is not None and self.min_samples > self.samples:
             raise problem(f"must be at most samples ({self.samples}), got {self.min_samples}", "min_samples")
-        return self
 
     @property
     def used_min_samples(self) -> int:

@@ -2,12 +2,12 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.errors import SceneError, Where
-from clfractal.schema.base import Direction, Position, Reflectance, Section, check_frame, problem
+from clfractal.schema.base import Direction, Position, Reflectance, Section, check_frame, problem, rule
 from clfractal.schema.fields import SCALE, Usual
 
 # Screen, distance and eyes are measured in one unit, so their ratios cannot be larger than this.
@@ -69,10 +69,9 @@ class StereoPlane(Section):
         None, description="scene units; null: the height that makes pixels square on the screen"
     )
 
-    @model_validator(mode="after")
-    def _faces_somewhere(self) -> Self:
+    @rule
+    def _faces_somewhere(self) -> None:
         check_frame(self.normal, self.up)
-        return self
 
 
 class Stereo(Section):
@@ -119,8 +118,8 @@ class Stereo(Section):
         description="for mode anaglyph_chessboard: the left and the right filter, linear Rec. 709",
     )
 
-    @model_validator(mode="after")
-    def _of_one_viewer(self) -> Self:
+    @rule
+    def _of_one_viewer(self) -> None:
         for key in ("screen_distance", "interpupillary_distance"):
             measure = getattr(self, key)
             if not 1 / MAX_RATIO <= measure / self.screen_width <= MAX_RATIO:
@@ -129,7 +128,6 @@ class Stereo(Section):
                     f" got {measure:g}",
                     key,
                 )
-        return self
 
     @property
     def eyes(self) -> tuple[EyeName, ...]:

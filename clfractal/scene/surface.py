@@ -1,13 +1,13 @@
 """The surface renderer's settings: the search for the surface, its normals, and the sampling of pixels."""
 
 from math import isqrt
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.ball import Ball
-from clfractal.schema.base import Length, Section, problem
+from clfractal.schema.base import Length, Section, problem, rule
 from clfractal.schema.fields import Usual
 
 # Normals that need a middle point and its eight neighbours, so a grid with an odd side.
@@ -21,14 +21,13 @@ class Points(Section):
     pattern: Literal["grid", "stochastic"] = Field("grid", description="a square grid, or random places")
     count: int = Field(9, ge=1, le=MAX_POINTS, description="number of points per pixel")
 
-    @model_validator(mode="after")
-    def _countable(self) -> Self:
+    @rule
+    def _countable(self) -> None:
         if self.pattern == "grid" and isqrt(self.count) ** 2 != self.count:
             squares = ", ".join(str(n * n) for n in range(1, isqrt(MAX_POINTS) + 1))
             raise problem(f"must be a square for a grid ({squares}), got {self.count}", "count")
         if self.pattern == "stochastic" and self.count < 4:
             raise problem(f"must be from 4 to {MAX_POINTS} for stochastic points, got {self.count}", "count")
-        return self
 
 
 class AmbientOcclusion(Section):
@@ -100,10 +99,10 @@ class SurfaceRenderer(Sampled):
         description="most light that one sample's mirrored or environment rays may add; null: no limit",
     )
 
-    @model_validator(mode="after")
-    def _enough_points(self) -> Self:
+    @rule
+    def _enough_points(self) -> None:
         if not self.normal_of_points or self.points is None:
-            return self
+            return
         pattern, count = self.points.pattern, self.points.count
         if self.normal in GRID_NORMALS and (pattern != "grid" or count not in (9, 25, 49)):
             raise problem(
@@ -111,7 +110,6 @@ class SurfaceRenderer(Sampled):
             )
         if count < 4:
             raise problem(f"{self.normal} needs at least 4 points, got {count}", "normal")
-        return self
 
     @property
     def normal_of_points(self) -> bool:

@@ -2,13 +2,13 @@
 
 from collections.abc import Mapping
 from math import prod
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag
 
 from clfractal.errors import SceneError, Where
 from clfractal.scene.sampled import Sampled
-from clfractal.schema.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem
+from clfractal.schema.base import Color, Fraction, Position, Section, Vector, chosen_by_list, problem, rule
 from clfractal.schema.fields import SCALE, Usual
 from clfractal.schema.stops import IN_ORDER
 
@@ -87,11 +87,10 @@ class Transfer(Section):
         | None
     ) = Field(None, description="stops in order of `at`, beside `opacity`; null: nothing shines by itself")
 
-    @model_validator(mode="after")
-    def _has_depth(self) -> Self:
+    @rule
+    def _has_depth(self) -> None:
         if self.emission is not None and self.opacity is None:
             raise problem("needs opacity, since a surface at a level has no depth that shines", "emission")
-        return self
 
     @property
     def visible(self) -> tuple[tuple[float, bool], ...]:

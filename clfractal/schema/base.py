@@ -4,10 +4,10 @@ The models name their types without `from __future__ import annotations`, and ar
 keep the import of the schema short.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from math import cos, fmod, radians, sin
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
 
 from pydantic import (
     AfterValidator,
@@ -17,6 +17,7 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     ValidationError,
+    model_validator,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
 
@@ -25,6 +26,7 @@ from clfractal.errors.arguments import plain
 from clfractal.schema.fields import DIRECTION, PLACE
 from clfractal.schema.hex_color import AS_TEXT
 
+S = TypeVar("S", bound="Section")
 Vector: TypeAlias = tuple[float, float, float]
 
 Coordinate = Annotated[float, Field(strict=True, ge=-1e6, le=1e6, allow_inf_nan=False)]
@@ -159,6 +161,16 @@ def problem(message: str, at: str | tuple[str | int, ...] = "") -> PydanticCusto
     """Our own error inside a validator, at the key (or path, dotted or of parts) `at` of the model that raises it."""
     path = tuple(part for part in at.split(".") if part) if isinstance(at, str) else at
     return PydanticCustomError("clfractal", "{message}", {"message": message, "at": path})
+
+
+def rule(check: Callable[[S], None]) -> Any:
+    """For sections: what several of its values keep to; the method raises a `problem` otherwise, once all are made."""
+
+    def keep(section: S) -> S:
+        check(section)
+        return section
+
+    return model_validator(mode="after")(keep)
 
 
 class _ByKey:

@@ -3,11 +3,11 @@
 from collections.abc import Mapping, Sequence
 from math import radians, sin
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Self
+from typing import Annotated, Any, ClassVar
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Amount, Color, Vector, problem
+from clfractal.schema.base import Amount, Color, Vector, problem, rule
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import Element
 from clfractal.schema.record import Number
@@ -43,11 +43,10 @@ class LightBase(Element):
         None, description="shadow rays per sample for a soft shadow; null: 8. A hard shadow takes one"
     )
 
-    @model_validator(mode="after")
-    def _one_color(self) -> Self:
+    @rule
+    def _one_color(self) -> None:
         if self.temperature is not None and self.color != (1.0, 1.0, 1.0):
             raise problem("cannot be combined with color: give one of color or temperature", "temperature")
-        return self
 
     @classmethod
     def first(cls, away: float) -> dict[str, Any]:

@@ -1,9 +1,9 @@
 """Values of a material that differ from place to place: a quantity through a curve, or a picture."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, ClassVar, Self, get_args
+from typing import Annotated, Any, ClassVar, get_args
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 from pydantic.fields import FieldInfo
 
 from clfractal.schema.base import (
@@ -17,6 +17,7 @@ from clfractal.schema.base import (
     Reflectance,
     Section,
     problem,
+    rule,
 )
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
@@ -61,8 +62,8 @@ class Map(ByQuantity):
         4.0, description="how narrow the seams between the texture's three sides are"
     )
 
-    @model_validator(mode="after")
-    def _one_source(self) -> Self:
+    @rule
+    def _one_source(self) -> None:
         if self.by is None and self.texture is None:
             raise problem("needs one of by or texture")
         if self.by is not None and self.texture is not None:
@@ -70,7 +71,6 @@ class Map(ByQuantity):
         low, high = self.used_range
         if low == high:
             raise problem(f"must be two different numbers, got {low:g} twice", "range")
-        return self
 
     @property
     def used_range(self) -> tuple[float, float]:
@@ -170,8 +170,8 @@ class Mapped(Section):
     # Not named by the schema; sections that are no part of a material have none.
     maps: ClassVar[bool] = True
 
-    @model_validator(mode="after")
-    def _maps_in_bounds(self) -> Self:
+    @rule
+    def _maps_in_bounds(self) -> None:
         for name, field in type(self).model_fields.items():
             found = getattr(self, name)
             if isinstance(found, Map):
@@ -179,7 +179,6 @@ class Mapped(Section):
                     found.check(*_limits(field.annotation))
                 except Exception as error:
                     raise _inside(error, name) from None
-        return self
 
 
 def _inside(error: Exception, name: str) -> Exception:

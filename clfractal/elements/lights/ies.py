@@ -4,13 +4,13 @@ import re
 from collections.abc import Iterator, Sequence
 from math import isfinite
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn, Self
+from typing import Annotated, Literal, NoReturn
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from clfractal.errors import FileError, Where
 from clfractal.files.regular import read_bytes
-from clfractal.schema.base import Amount, Direction, Position, cross, length, problem, unit
+from clfractal.schema.base import Amount, Direction, Position, cross, length, problem, rule, unit
 from clfractal.schema.light import AXIS, SmallLight
 from clfractal.schema.record import Number
 
@@ -49,11 +49,10 @@ class IesLight(SmallLight):
         (0.0, 1.0, 0.0), description="about where horizontal angles are 0; not along `direction`"
     )
 
-    @model_validator(mode="after")
-    def _has_a_frame(self) -> Self:
+    @rule
+    def _has_a_frame(self) -> None:
         if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
             raise problem("must not be along direction", "up")
-        return self
 
     def given(self, away: float) -> float:
         """As of every light."""

@@ -1,11 +1,11 @@
 """A rectangle that shines."""
 
 from math import pi
-from typing import Any, Literal, Self
+from typing import Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Direction, Length, Position, Vector, cross, length, problem, unit
+from clfractal.schema.base import Direction, Length, Position, Vector, cross, length, problem, rule, unit
 from clfractal.schema.light import AXIS, SingleLight
 from clfractal.schema.record import Number
 
@@ -32,11 +32,10 @@ class RectangleLight(SingleLight):
     height: Length = Field(1.0, description="scene units")
     visible: bool = Field(True, description="whether the eye sees it; mirrors and paths of light always do")
 
-    @model_validator(mode="after")
-    def _has_a_frame(self) -> Self:
+    @rule
+    def _has_a_frame(self) -> None:
         if length(cross(unit(self.direction), unit(self.up))) < 1e-6:
             raise problem("must not be along direction", "up")
-        return self
 
     @classmethod
     def first(cls, away: float) -> dict[str, Any]:

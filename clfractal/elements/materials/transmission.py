@@ -1,10 +1,10 @@
 """Glass in the place of the diffuse body."""
 
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import Field, Tag, model_validator
+from pydantic import Field, Tag
 
-from clfractal.schema.base import problem
+from clfractal.schema.base import problem, rule
 from clfractal.schema.mapped import FORM, FractionMap, NumberMap, ReflectanceMap
 from clfractal.schema.material import BLACK, WHITE, DepthMap, ForwardMap, Part
 
@@ -37,8 +37,7 @@ class Transmission(Part):
         20.0, description="the smaller, the farther colours spread: 20 more than any glass, 60 window glass"
     )
 
-    @model_validator(mode="after")
-    def _deep_enough(self) -> Self:
+    @rule
+    def _deep_enough(self) -> None:
         if self.scatter != BLACK and self.depth == 0:
             raise problem("needs a depth above 0: scattering is told for the way through it", "scatter")
-        return self

@@ -1,11 +1,11 @@
 """A torus as an object."""
 
 from math import hypot
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from clfractal.schema.base import Length, Vector, problem
+from clfractal.schema.base import Length, Vector, problem, rule
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
 
@@ -25,11 +25,10 @@ class TorusObject(Solid):
         0.15, description="radius of its tube, at most `radius`, scene units"
     )
 
-    @model_validator(mode="after")
-    def _has_a_ring(self) -> Self:
+    @rule
+    def _has_a_ring(self) -> None:
         if self.tube > self.radius:
             raise problem(f"must be at most the ring's radius, {self.radius:g}, got {self.tube:g}", "tube")
-        return self
 
     @classmethod
     def first(cls, radius: float) -> dict[str, Any]:
