@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import FileError, Where
-from clfractal.files.exr_header import MAGIC
+from clfractal.files.exr_header import MAGIC, read_header
 from clfractal.files.regular import read_bytes
 from clfractal.files.srgb import decode
 
@@ -60,7 +60,6 @@ def _photo(path: Path, data: bytes) -> Floats:
 
 def _exr(path: Path) -> Floats:
     from clfractal.files.exr import read_exr
-    from clfractal.files.exr_header import read_header
 
     header = read_header(path)
     window = header.values().get("dataWindow")

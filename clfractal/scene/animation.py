@@ -116,39 +116,29 @@ class Track(Section):
                 raise problem("needs handles: [x1, y1, x2, y2], as for bezier", ("keys", index))
 
 
-_SECONDS = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(s|min)\s*")
+def _with_unit(units: Mapping[str, tuple[float, float]], wanted: str) -> AlsoAs:
+    """A number may have one of some units, each with its factor and divisor: `4 s`, `1.5 min`, `180 deg`."""
+    form = re.compile(rf"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*({'|'.join(units)})\s*")
 
+    def read(value: Any) -> Any:
+        if not isinstance(value, str):
+            return value
+        found = form.fullmatch(value)
+        if found is None:
+            raise problem(f"must be {wanted}, got {value[:40]!r}")
+        factor, divisor = units[found[2]]
+        return float(found[1]) * factor / divisor
 
-def _seconds(value: Any) -> Any:
-    """`4 s` and `1.5 min` as seconds."""
-    found = _SECONDS.fullmatch(value) if isinstance(value, str) else None
-    if found is not None:
-        return float(found[1]) * (60 if found[2] == "min" else 1)
-    if isinstance(value, str):
-        raise problem(f"must be seconds, as 4 or '4 s', or '2 min', got {value[:40]!r}")
-    return value
+    return AlsoAs(read, {"type": "string", "pattern": f"^{form.pattern}$"})
 
 
 Duration = Annotated[
     Annotated[float, Field(strict=True, gt=0, le=1e6, allow_inf_nan=False)],
-    AlsoAs(_seconds, {"type": "string", "pattern": f"^{_SECONDS.pattern}$"}),
+    _with_unit({"s": (1, 1), "min": (60, 1)}, "seconds, as 4 or '4 s', or '2 min'"),
 ]
-_DEGREES = re.compile(r"\s*([0-9]+(?:\.[0-9]*)?|\.[0-9]+)\s*(deg|degrees)\s*")
-
-
-def _part_of_turn(value: Any) -> Any:
-    """`180 deg` as a part of a turn."""
-    found = _DEGREES.fullmatch(value) if isinstance(value, str) else None
-    if found is not None:
-        return float(found[1]) / 360
-    if isinstance(value, str):
-        raise problem(f"must be a part of a frame, as 0.5, or '180 deg', got {value[:40]!r}")
-    return value
-
-
 Opening = Annotated[
     Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)],
-    AlsoAs(_part_of_turn, {"type": "string", "pattern": f"^{_DEGREES.pattern}$"}),
+    _with_unit({"deg": (1, 360), "degrees": (1, 360)}, "a part of a frame, as 0.5, or '180 deg'"),
 ]
 Tracks = Annotated[dict[Text, Track], Field(max_length=MAX_TRACKS)]
 

@@ -17,7 +17,7 @@ from clfractal.files.channels import (
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.scene.object_checks import check_objects
+from clfractal.scene.object_checks import check_material, check_objects, inside_of
 from clfractal.scene.objects import FormulaObject
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.surface import SurfaceRenderer
@@ -248,13 +248,7 @@ def _check_residual(scene: Scene, renderer: SurfaceRenderer) -> None:
 
 def check_lighting(scene: Scene) -> None:
     """Raises SceneError for a material that is not there, and for what paths cannot show yet."""
-    from clfractal.errors import unknown_name
-
-    name = scene.material.name
-    if name is not None and name not in scene.materials:
-        if not scene.materials:
-            raise SceneError(f"names {name!r}, but the scene has no materials", Where(path="material.name"))
-        raise SceneError(unknown_name("material", name, tuple(scene.materials)), Where(path="material.name"))
+    check_material(scene, scene.material.name, "material.name")
     if any(material.blend is not None for material in scene.materials.values()):
         from clfractal.scene.blends import check_blends
 
@@ -310,11 +304,7 @@ def _check_lights(scene: Scene) -> None:
     found = inside_solid(scene, [position for _, position in candidates])
     for (index, position), inside in zip(candidates, found, strict=True):
         if inside:
-            shown = ", ".join(f"{x:g}" for x in position)
-            raise SceneError(
-                f"must be outside the object, where its light reaches something, got [{shown}]",
-                Where(path=f"lights.{index}.position"),
-            )
+            raise inside_of("the object", index, position)
 
 
 def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:

@@ -14,6 +14,7 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files import resources
+from clfractal.scene.beside import reading_beside
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Environment
@@ -74,7 +75,6 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
     if environment.file is None:
         return _shipped(environment.name or "")
     from clfractal.files.environment_map import read_environment
-    from clfractal.scene.beside import reading_beside
 
     with reading_beside(environment.file, folder, Where(path="environment.file")) as path:
         return EnvironmentMap(read_environment(path))

@@ -4,7 +4,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from clfractal.schema.base import Coordinate, Number, Section, problem, rule
+from clfractal.schema.base import Coordinate, Number, Section, check_one_of, problem, rule
 from clfractal.schema.fields import PLACE, WHOLE, Usual
 
 MAX_LINKS = 64
@@ -48,7 +48,7 @@ class ChainLink(_Source):
 
     @rule
     def _one_source(self) -> None:
-        _check_source(self, ("name", "file", "inline"))
+        check_one_of(self, "name", "file", "inline")
         if self.stop is not None and self.stop <= self.start:
             raise problem(f"must be above start, {self.start}, got {self.stop}", "stop")
 
@@ -71,11 +71,10 @@ class FormulaSpec(_Source):
 
     @rule
     def _one_source(self) -> None:
-        _check_source(self, ("name", "file", "inline", "chain"))
-        if self.chain is not None and self.parameters:
-            raise problem("belongs to the members of a chain, not to the chain", "parameters")
-        if self.chain is not None and self.live:
-            raise problem("belongs to the members of a chain, not to the chain", "live")
+        check_one_of(self, "name", "file", "inline", "chain")
+        for key in ("parameters", "live"):
+            if self.chain is not None and getattr(self, key):
+                raise problem("belongs to the members of a chain, not to the chain", key)
 
     def mapping(self) -> dict[str, Any]:
         """Plain data with the given keys only; it loads back to an equal FormulaSpec."""
@@ -87,12 +86,3 @@ def _without_empty(spec: dict[str, Any]) -> dict[str, Any]:
     if "chain" in spec:
         spec["chain"] = [_without_empty(link) for link in spec["chain"]]
     return {key: value for key, value in spec.items() if key not in ("parameters", "live") or value}
-
-
-def _check_source(spec: Section, keys: tuple[str, ...]) -> None:
-    given = [key for key in keys if getattr(spec, key) is not None]
-    listing = ", ".join(keys[:-1]) + f" or {keys[-1]}"
-    if not given:
-        raise problem(f"needs one of {listing}")
-    if len(given) > 1:
-        raise problem(f"cannot be combined with {given[0]}: give one of {listing}", given[1])

@@ -4,6 +4,7 @@ from clfractal.errors import SceneError, Where
 from clfractal.scene.grid_values import is_finite_somewhere, lacking
 from clfractal.scene.model import Scene
 from clfractal.scene.named_files import volumes_of
+from clfractal.scene.object_checks import refuse_lights
 from clfractal.scene.object_grids import PlacedGrid, placed, used_level
 from clfractal.schema.base import Vector
 
@@ -37,13 +38,5 @@ def _check_lights(scene: Scene, name: str, body: PlacedGrid, level: float) -> No
         value = body.value(point)
         return value is not None and value >= level
 
-    if inside(scene.camera.position):
-        return
-    for index, light in enumerate(scene.lights):
-        place = light.stands_at
-        if place is not None and inside(place):
-            shown = ", ".join(f"{x:g}" for x in place)
-            raise SceneError(
-                f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",
-                Where(path=f"lights.{index}.position"),
-            )
+    if not inside(scene.camera.position):
+        refuse_lights(scene, name, inside)

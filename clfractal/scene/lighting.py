@@ -12,7 +12,7 @@ from clfractal.schema.base import (
     Length,
     Reflectance,
     Section,
-    problem,
+    check_one_of,
     rule,
 )
 from clfractal.schema.fields import Usual
@@ -74,11 +74,7 @@ class Environment(Section):
 
     @rule
     def _one_source(self) -> None:
-        given = [key for key in ("name", "file", "sky") if getattr(self, key) is not None]
-        if not given:
-            raise problem("needs one of name, file or sky")
-        if len(given) > 1:
-            raise problem(f"cannot be combined with {given[0]}: give one of name, file or sky", given[1])
+        check_one_of(self, "name", "file", "sky")
 
 
 class Scattering(Section):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
 from pydantic import BaseModel, ConfigDict, Field, PrivateAttr, ValidationInfo, model_validator
 
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.errors.arguments import plain
 from clfractal.files.inputs import noting
 from clfractal.scene.animation import Animation
@@ -305,7 +305,6 @@ class Scene(Section):
         Raises:
             FormulaError: it is wrong; the path says where (a loaded scene's formula has been checked).
         """
-        from clfractal.errors import Where
         from clfractal.formulas import catalog
 
         return self.once(
@@ -319,7 +318,6 @@ class Scene(Section):
         Raises:
             FormulaError: one is wrong; the path says where (a loaded scene's formulas have been checked).
         """
-        from clfractal.errors import Where
         from clfractal.formulas import catalog
 
         return self.once(
@@ -412,8 +410,6 @@ class Scene(Section):
         return self.once("views", self._find_views)
 
     def _find_views(self) -> "list[tuple[Scene, Place]]":
-        from clfractal.errors import SceneError, Where
-
         assert self.layout is not None
         found = []
         places = self.layout.places(self.image.width, self.image.height, self.image.reference)

@@ -1,5 +1,7 @@
 """Checks of a scene's objects: their materials, lights in them, and what cannot show them."""
 
+from collections.abc import Callable
+
 from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.scene.blends import is_glass, is_subsurface
@@ -11,6 +13,8 @@ from clfractal.scene.objects import KINDS, MAX_FORMULAS, MAX_VOLUMES, FormulaObj
 from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.base import Vector
+from clfractal.schema.light import LightBase
 from clfractal.schema.mapped import maps_of
 from clfractal.schema.shape import Level, Solid
 
@@ -26,7 +30,8 @@ def check_objects(scene: Scene) -> None:
     _check_joined(scene)
     _check_volumes(scene)
     for name, each in scene.objects.items():
-        _check_material(scene, name, each.material)
+        check_material(scene, each.material, f"objects.{name}.material")
+        _check_kind(scene, name, each.material, Where(path=f"objects.{name}.material"))
         _check_cut(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
@@ -164,14 +169,13 @@ def _inside(scene: Scene, material: str | None) -> str:
     return "subsurface" if subsurface else ""
 
 
-def _check_material(scene: Scene, name: str, material: str | None) -> None:
-    where = Where(path=f"objects.{name}.material")
-    if material is None or material in scene.materials:
-        _check_kind(scene, name, material, where)
+def check_material(scene: Scene, name: str | None, path: str) -> None:
+    """Raises SceneError, at a path, for the name of a material that is not there."""
+    if name is None or name in scene.materials:
         return
     if not scene.materials:
-        raise SceneError(f"names {material!r}, but the scene has no materials", where)
-    raise SceneError(unknown_name("material", material, tuple(scene.materials)), where)
+        raise SceneError(f"names {name!r}, but the scene has no materials", Where(path=path))
+    raise SceneError(unknown_name("material", name, tuple(scene.materials)), Where(path=path))
 
 
 def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> None:
@@ -200,20 +204,40 @@ def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> 
 
 
 def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
-    """A light in a solid reaches nothing, but where the eye is in it too: then it is a room."""
-    if solid.holds(scene.camera.position):
-        return
+    """No light in a solid reaches anything, but one that paths find, or that a cut lets out."""
     inside = _inside(scene, solid.material or scene.material.name)
     opened = [plane for plane in scene.cut_planes if name in plane.cut_objects]
+
+    def holds(point: Vector) -> bool:
+        return solid.holds(point) and not any(plane.in_front(point) for plane in opened)
+
+    if not solid.holds(scene.camera.position):
+        # (What is seen has a size, so that paths find it.)
+        refuse_lights(scene, name, holds, lambda light: bool(inside) and light.is_seen)
+
+
+def refuse_lights(
+    scene: Scene,
+    name: str,
+    holds: Callable[[Vector], bool],
+    reaches: Callable[[LightBase], bool] = lambda light: False,
+) -> None:
+    """Raises SceneError for a light within an object that reaches nothing.
+
+    Args:
+        holds: whether a point is in the object.
+        reaches: whether a light does all the same.
+    """
     for index, light in enumerate(scene.lights):
-        if inside and light.is_seen:
-            continue  # paths find it, since it has a size
         place = light.stands_at
-        if place is not None and solid.holds(place):
-            if any(plane.in_front(place) for plane in opened):
-                continue
-            shown = ", ".join(f"{x:g}" for x in place)
-            raise SceneError(
-                f"must be outside the object {name!r}, where its light reaches something, got [{shown}]",
-                Where(path=f"lights.{index}.position"),
-            )
+        if place is not None and not reaches(light) and holds(place):
+            raise inside_of(f"the object {name!r}", index, place)
+
+
+def inside_of(what: str, index: int, place: Vector) -> SceneError:
+    """The error of a light that stands inside of something."""
+    shown = ", ".join(f"{x:g}" for x in place)
+    return SceneError(
+        f"must be outside {what}, where its light reaches something, got [{shown}]",
+        Where(path=f"lights.{index}.position"),
+    )

@@ -251,8 +251,18 @@ def turn(vector: Vector, axis: Vector, degrees: float) -> Vector:
     return (x, y, z)
 
 
+def check_one_of(section: Section, *keys: str) -> None:
+    """For rules: exactly one of some keys is given."""
+    given = [key for key in keys if getattr(section, key) is not None]
+    listing = ", ".join(keys[:-1]) + f" or {keys[-1]}"
+    if not given:
+        raise problem(f"needs one of {listing}")
+    if len(given) > 1:
+        raise problem(f"cannot be combined with {given[0]}: give one of {listing}", given[1])
+
+
 def check_frame(normal: Vector, up: Vector) -> None:
-    """For validators of rectangles: `up` must not lie along the normal."""
+    """For rules of rectangles: `up` must not lie along the normal."""
     if length(cross(normal, up)) <= 1e-6 * length(normal) * length(up):
         raise problem("must not be parallel to the normal", "up")
 

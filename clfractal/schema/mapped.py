@@ -16,6 +16,7 @@ from clfractal.schema.base import (
     Position,
     Reflectance,
     Section,
+    check_one_of,
     problem,
     rule,
 )
@@ -64,10 +65,7 @@ class Map(ByQuantity):
 
     @rule
     def _one_source(self) -> None:
-        if self.by is None and self.texture is None:
-            raise problem("needs one of by or texture")
-        if self.by is not None and self.texture is not None:
-            raise problem("cannot be combined with by: give one of by or texture", "texture")
+        check_one_of(self, "by", "texture")
         low, high = self.used_range
         if low == high:
             raise problem(f"must be two different numbers, got {low:g} twice", "range")
