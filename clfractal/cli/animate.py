@@ -59,7 +59,6 @@ def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> Non
 
 def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
     begun = time.perf_counter()
-    shell.mute_drivers()
     scene = ordered_scene(order)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation

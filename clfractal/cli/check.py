@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from clfractal.cli.pipes import piped
 from clfractal.cli.shell import Shell
 from clfractal.errors import SceneError, Where, speaking_of
+from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
@@ -50,7 +51,6 @@ def check_scene(
     Raises:
         ClfractalError: the scene is wrong; or `parallax` of a scene without stereo, or without a device.
     """
-    shell.mute_drivers()  # and the library that reads environment maps
     with piped(shell, source, ()) as files:
         source = files.source
         scene = load_scene(Path(source), overrides=overrides, folder=files.folder)
@@ -121,7 +121,6 @@ def _value(value: float | tuple[float, ...]) -> str:
 def _eyes(scene: Scene) -> list[str]:
     """Remarks: where the viewer's eyes are in the scene, the camera's new position, and the plane on the screen."""
     from clfractal.camera.views import shown_views
-    from clfractal.scene.cut_plane import CutPlaneRenderer
     from clfractal.stereo.eyes import eye_views, relation
 
     lines = []

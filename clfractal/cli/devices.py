@@ -37,7 +37,6 @@ def list_devices(shell: Shell, *, as_json: bool) -> None:
     Raises:
         DeviceError: there is none.
     """
-    shell.mute_drivers()
     default = select.choose(None)
     found = [
         (info, _measured(select.by_key(info.index, info.key), shell.say), info.index == default.info.index)

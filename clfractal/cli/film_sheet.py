@@ -43,7 +43,6 @@ def _preview(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
     from clfractal.images.formats import check_output
 
     begun = time.perf_counter()
-    shell.mute_drivers()
     scene = ordered_scene(order)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation

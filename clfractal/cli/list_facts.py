@@ -156,5 +156,4 @@ def bench(
     from clfractal.cli.bench import run
 
     shell = shell_of(context, quiet=quiet, verbose=verbose)
-    shell.mute_drivers()
     return lambda: run(device=device, json_file=json_file, shell=shell, wanted=rows or ())

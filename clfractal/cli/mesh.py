@@ -36,7 +36,6 @@ def make_mesh(order: GridOrder, shell: Shell, *, level: float | None = None, clo
 
 def _make_mesh(order: GridOrder, shell: Shell, level: float | None, close: bool) -> None:
     start = time.perf_counter()
-    shell.mute_drivers()
     check_output(order.output, EXTENSIONS)
     if level is not None and not math.isfinite(level):
         raise SceneError(f"must be a number, got {level}", Where("--level"))

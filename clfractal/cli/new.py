@@ -67,7 +67,6 @@ def new_scene(name: str, formula: str | None, device: str | None, shell: Shell) 
     Raises:
         ClfractalError: the file exists or cannot be written, the formula is wrong or shows nothing, or the device failed.
     """
-    shell.mute_drivers()
     path = Path(name)
     if path.name in ("", ".."):
         raise FileError("must name a file", Where("NAME"))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -53,25 +54,23 @@ def render_one(
     """
     begun = time.perf_counter()
     header = job.header()
-    reporter = Reporter(shell, job.tiles)
-    if not keep and 4 * job.region.pixels * len(job.channels) <= _IN_MEMORY:
-        framebuffers = JobFramebuffers(job)
-        state = _run(job, framebuffers.framebuffers, engine, reporter)
-        rendered = time.perf_counter()
-        _save(job, framebuffers.framebuffers, paths, header, bits or {})
-        return _made(state, begun, rendered)
     if resume:
         job = continued(job, paths[0])
-    with Unfinished(job, header, paths[0], shell, resume=resume) as unfinished:
-        state = _run(job, unfinished.framebuffers, engine, reporter)
+    work: AbstractContextManager[JobFramebuffers | Unfinished]
+    if keep or 4 * job.region.pixels * len(job.channels) > _IN_MEMORY:
+        work = Unfinished(job, header, paths[0], shell, resume=resume)
+    else:
+        work = nullcontext(JobFramebuffers(job))
+    reporter = Reporter(shell, job.tiles)
+    with work as stores:
+        try:
+            state = run(job, stores.framebuffers, engine.executor, progress=reporter)
+        finally:
+            reporter.close()
         rendered = time.perf_counter()
-        _save(job, unfinished.framebuffers, paths, header, bits or {})
-        return _made(state, begun, rendered)
-
-
-def _made(state: Progress, begun: float, rendered: float) -> Made:
-    now = time.perf_counter()
-    return Made(state, 1e3 * (now - begun), 1e3 * (now - rendered))
+        _save(job, stores.framebuffers, paths, header, bits or {})
+        now = time.perf_counter()
+        return Made(state, 1e3 * (now - begun), 1e3 * (now - rendered))
 
 
 def _save(
@@ -89,10 +88,3 @@ def _save(
             output = job.scene.output.model_copy(update={"png_bits": bits[path]})
             wanted = job.scene.model_copy(update={"output": output})
             save_job(replace(job, scene=wanted), stores, (path,), header)
-
-
-def _run(job: Job, stores: Sequence[TiledStore], engine: AnyEngine, reporter: Reporter) -> Progress:
-    try:
-        return run(job, stores, engine.executor, progress=reporter)
-    finally:
-        reporter.close()

@@ -26,7 +26,6 @@ def precompile(sources: Sequence[str], device: str | None, precision: str | None
         ClfractalError: a scene or an option is wrong, or the device failed.
     """
     start = time.perf_counter()
-    shell.mute_drivers()
     named = {source: _loaded(source, shell) for source in sources}
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.device import cache

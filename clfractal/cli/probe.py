@@ -24,7 +24,6 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
     Raises:
         ClfractalError: anything wrong with the input or the device.
     """
-    shell.mute_drivers()
     x, y = numbers_of("X,Y", pixel, ",", 2, "X,Y, such as 640,360")
     with piped(shell, order.scene, ()) as files:
         order = replace(order, scene=files.source, folder=files.folder)

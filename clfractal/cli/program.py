@@ -82,6 +82,7 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
             # What the start has made stays until the end, so it is no garbage: from now on only newer objects are searched.
             gc.freeze()
             gc.enable()
+        shell.mute_drivers()
         with Patience(shell):
             work()
     return 0

@@ -12,6 +12,7 @@ from clfractal.device.activity import Activity, current
 
 if TYPE_CHECKING:
     from rich.progress import Progress as Bar
+    from rich.progress import ProgressColumn
 
     from clfractal.engine.run import Progress
 
@@ -129,7 +130,6 @@ class Reporter:
 
     def _draw(self, state: Progress) -> None:
         if self._bar is None:
-            self._shell.clear_status()
             self._bar = _new_bar(self._shell, self._tiles)
             self._shell.stalled = self._stalled
         task = self._bar.task_ids[0]
@@ -166,46 +166,36 @@ def _left(state: Progress) -> str:
 
 def counting_bar(shell: Shell, doing: str, total: int) -> Bar:
     """A bar for so many things, on a terminal; it is refreshed by hand."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn
-    from rich.progress import Progress as Bar
+    from rich.progress import MofNCompleteColumn, TimeElapsedColumn
 
-    shell.clear_status()
-    bar = Bar(
-        TextColumn(doing),
-        BarColumn(),
-        MofNCompleteColumn(),
-        TimeElapsedColumn(),
-        console=Console(file=shell.errors),
-        auto_refresh=False,
-        transient=True,
-        redirect_stdout=False,
-        redirect_stderr=False,
-    )
-    bar.add_task(doing, total=total)
-    bar.start()
-    return bar
+    return _started(shell, doing, total, MofNCompleteColumn(), TimeElapsedColumn())
 
 
 def _new_bar(shell: Shell, tiles: int) -> Bar:
+    from rich.progress import TaskProgressColumn, TextColumn
+
+    words = {"rate": "", "left": "", "stalled": ""}
+    columns = [TextColumn(f"{{task.fields[{name}]}}") for name in words]
+    return _started(shell, "rendering", tiles, TaskProgressColumn(), *columns, **words)
+
+
+def _started(shell: Shell, doing: str, total: int, *columns: ProgressColumn, **words: str) -> Bar:
     from rich.console import Console
-    from rich.progress import BarColumn, TaskProgressColumn, TextColumn
+    from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar
 
+    shell.clear_status()
     # Refreshed by hand: a drawing thread would spoil the message while Ctrl-C is handled.
     bar = Bar(
-        TextColumn("rendering"),
+        TextColumn(doing),
         BarColumn(),
-        TaskProgressColumn(),
-        TextColumn("{task.fields[rate]}"),
-        TextColumn("{task.fields[left]}"),
-        TextColumn("{task.fields[stalled]}"),
+        *columns,
         console=Console(file=shell.errors),
         auto_refresh=False,
         transient=True,
         redirect_stdout=False,
         redirect_stderr=False,
     )
-    bar.add_task("rendering", total=tiles, rate="", left="", stalled="")
+    bar.add_task(doing, total=total, **words)
     bar.start()
     return bar

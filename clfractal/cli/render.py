@@ -60,7 +60,6 @@ def render_files(order: Order, shell: Shell) -> None:
     """
     start = time.perf_counter()
     region = _region(order.region)
-    shell.mute_drivers()
     scene = ordered_scene(order)
     outputs = checked_outputs(order, scene, region)
     tell_reference(order, scene, shell)

@@ -49,7 +49,6 @@ def draw_sheet(names: Sequence[str], sheet: Path, device: str | None, shell: She
     """
     begun = time.perf_counter()
     refuse_stream(sheet, "name a file for the sheet")
-    shell.mute_drivers()
     files = {name: _file_of(name) for name in names} if names else scene_files()
     from clfractal.images.formats import check_output
 

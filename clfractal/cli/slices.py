@@ -57,7 +57,6 @@ def render_slices(order: Order, stack: Stack, shell: Shell) -> None:
 
 def _render_slices(order: Order, stack: Stack, shell: Shell) -> None:
     begun = time.perf_counter()
-    shell.mute_drivers()
     _check(stack)
     scene = ordered_scene(order)
     if not isinstance(scene.renderer, CutPlaneRenderer):

@@ -95,7 +95,6 @@ def vary_scene(order: Order, choice: Choice, shell: Shell) -> None:
 
 def _vary(order: Order, choice: Choice, shell: Shell) -> None:
     begun = time.perf_counter()
-    shell.mute_drivers()
     kinds = _checked(choice)
     sized = ordered_scene(order)
     # The scene files keep the scene's own size: the option is for the small pictures.
@@ -131,7 +130,8 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
                 framebuffer.tell("scene", text)
                 framebuffer.save(choice.folder / f"{name}.png")
             path = choice.folder / f"{name}.yaml"
-            _write(path, (_heading(order, choice, len(pictures) + 1, variation) + text).encode())
+            with atomic_writer(path) as beside:
+                beside.write_bytes((_heading(order, choice, len(pictures) + 1, variation) + text).encode())
             pictures.append(framebuffer.to_rgb8())
             shell.say(f"{path}: {variation.remark}")
     if not pictures:
@@ -262,8 +262,3 @@ class _Moved:
 
 def _plainest() -> Scene:
     return Scene.model_validate({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
-
-
-def _write(path: Path, data: bytes) -> None:
-    with atomic_writer(path) as beside:
-        beside.write_bytes(data)

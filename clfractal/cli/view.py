@@ -50,7 +50,6 @@ def view(options: Options, shell: Shell) -> None:
     if remark:
         shell.say(remark)
     sys.setswitchinterval(0.0002)  # the window's thread must not wait long for the others
-    shell.mute_drivers()
     begun = begin(options)
     interrupt.wake = window.wake
     from clfractal.viewer.app import Viewer

@@ -81,7 +81,6 @@ def voxelize(order: GridOrder, shell: Shell, *, compress: bool = False) -> None:
 
 def _voxelize(order: GridOrder, shell: Shell, compress: bool) -> None:
     start = time.perf_counter()
-    shell.mute_drivers()
     check_output(order.output, EXTENSIONS)
     files: list[str | Path] = [order.output]
     if order.output.suffix.lower() == ".npy":

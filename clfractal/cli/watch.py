@@ -24,7 +24,6 @@ from clfractal.scene.stereo import APART
 if TYPE_CHECKING:
     from clfractal.device.cancel import CancelToken
     from clfractal.engine.engine import Engine
-    from clfractal.images.framebuffer import Framebuffer
 
 # Seconds between two looks at the disk, and between two pictures of one scene that are not its last.
 _INTERVAL, _LEAST_APART = 0.25, 0.5
@@ -48,7 +47,6 @@ def watch_scene(order: Order, shell: Shell) -> None:
     for path in order.outputs:
         check_output(path)
     refuse_overwriting(order.outputs, [order.scene])
-    shell.mute_drivers()
     watched = Watched([Path(order.scene)], interval=_INTERVAL)
     scene: Scene | None
     try:
@@ -68,18 +66,13 @@ def watch_scene(order: Order, shell: Shell) -> None:
             if scene is not None and not _rendered(order, scene, engine, watched, shell):
                 shell.say(f"{order.scene}: changed")
             else:
-                _wait(watched)
+                while not watched.changed():
+                    time.sleep(_INTERVAL / 2)
             try:
                 scene = _read(order, watched)
             except ClfractalError as error:
                 scene = None
                 shell.refuse(str(error))
-
-
-def _wait(watched: Watched) -> None:
-    """Returns once a file has changed."""
-    while not watched.changed():
-        time.sleep(_INTERVAL / 2)
 
 
 def _read(order: Order, watched: Watched) -> Scene:
@@ -111,7 +104,7 @@ def _read(order: Order, watched: Watched) -> Scene:
 def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shell: Shell) -> bool:
     """Renders a scene to all outputs, coarse at first; False if a file has changed in the meantime."""
     begun = time.perf_counter()
-    outputs = checked_outputs(order, scene)
+    outputs, output = checked_outputs(order, scene), scene.output
     try:
         with _ended_by_change(watched) as token, speaking_of(order.scene), naming_options():
             written = 0.0
@@ -121,7 +114,9 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
                 last = not framebuffer.stage
                 if last or time.perf_counter() - written >= _LEAST_APART:
                     for path in outputs:
-                        _save(framebuffer, scene, path)
+                        framebuffer.save(
+                            path, half=output.half_channels, bits=output.png_bits, quality=output.quality
+                        )
                     written = time.perf_counter()
     except Stopped:
         return False
@@ -133,11 +128,6 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
     for remark in framebuffer.remarks:
         shell.say(f"{order.scene}: {remark}")
     return True
-
-
-def _save(framebuffer: Framebuffer, scene: Scene, path: Path) -> None:
-    output = scene.output
-    framebuffer.save(path, half=output.half_channels, bits=output.png_bits, quality=output.quality)
 
 
 @contextmanager
