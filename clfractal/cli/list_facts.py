@@ -17,12 +17,11 @@ from clfractal.cli.options import (
     Scene,
     Verbose,
     Work,
-    app,
-    shell_of,
+    command,
 )
 
 
-@app.command()
+@command
 def check(
     context: typer.Context,
     scene: Scene,
@@ -40,13 +39,12 @@ def check(
     """Check a scene and print it with every default filled in."""
     from clfractal.cli.check import check_scene
 
-    shell = shell_of(context, verbose=verbose)
     return lambda: check_scene(
-        scene, tuple(overrides or ()), shell, parallax=parallax, as_json=as_json, device=device
+        scene, tuple(overrides or ()), context.obj, parallax=parallax, as_json=as_json, device=device
     )
 
 
-@app.command()
+@command
 def probe(
     context: typer.Context,
     scene: Scene,
@@ -69,22 +67,20 @@ def probe(
     order = Order(
         scene=scene, device=device, precision=precision, size=size, overrides=tuple(overrides or ())
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: probe_pixel(order, pixel, shell, as_json=as_json)
+    return lambda: probe_pixel(order, pixel, context.obj, as_json=as_json)
 
 
-@app.command()
+@command
 def devices(
     context: typer.Context, as_json: AsJson = False, quiet: Quiet = False, verbose: Verbose = False
 ) -> Work:
     """List every OpenCL device and its speed, which is measured once and then remembered."""
     from clfractal.cli.devices import list_devices
 
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: list_devices(shell, as_json=as_json)
+    return lambda: list_devices(context.obj, as_json=as_json)
 
 
-@app.command()
+@command
 def precompile(
     context: typer.Context,
     scenes: Annotated[
@@ -102,11 +98,10 @@ def precompile(
     """Compile programs before pictures and windows wait for them; they are kept in the cache."""
     from clfractal.cli.precompile import precompile as work
 
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: work(tuple(scenes or ()), device, precision, shell)
+    return lambda: work(tuple(scenes or ()), device, precision, context.obj)
 
 
-@app.command()
+@command
 def formulas(
     context: typer.Context,
     name: Annotated[
@@ -120,25 +115,23 @@ def formulas(
     """List the library of formulas, or describe one."""
     from clfractal.cli import list_formulas as work
 
-    shell = shell_of(context)
     facts, words = (
         (work.facts_of_all, work.list_formulas)
         if name is None
         else (lambda: work.facts_of(name), lambda: work.tell_formula(name))
     )
-    return lambda: shell.print_json(facts()) if as_json else shell.print(words())
+    return lambda: context.obj.print_json(facts()) if as_json else context.obj.print(words())
 
 
-@app.command()
+@command
 def schema(context: typer.Context) -> Work:
     """Print the JSON Schema of scene files, for editors."""
     from clfractal.scene import load
 
-    shell = shell_of(context)
-    return lambda: shell.print_json(load.schema())
+    return lambda: context.obj.print_json(load.schema())
 
 
-@app.command()
+@command
 def bench(
     context: typer.Context,
     device: DeviceOption = None,
@@ -155,5 +148,4 @@ def bench(
     """Measure this machine's speed and print a table."""
     from clfractal.cli.bench import run
 
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: run(device=device, json_file=json_file, shell=shell, wanted=rows or ())
+    return lambda: run(device=device, json_file=json_file, shell=context.obj, wanted=rows or ())

@@ -16,12 +16,11 @@ from clfractal.cli.options import (
     Scene,
     Verbose,
     Work,
-    app,
-    shell_of,
+    command,
 )
 
 
-@app.command()
+@command
 def voxelize(
     context: typer.Context,
     scene: Scene,
@@ -39,11 +38,10 @@ def voxelize(
     from clfractal.cli.voxelize import voxelize as work
 
     order = GridOrder(scene, output, resolution, device, precision, tuple(overrides or ()))
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: work(order, shell, compress=compress)
+    return lambda: work(order, context.obj, compress=compress)
 
 
-@app.command()
+@command
 def mesh(
     context: typer.Context,
     source: Annotated[
@@ -71,5 +69,4 @@ def mesh(
     from clfractal.cli.voxelize import GridOrder
 
     order = GridOrder(source, output, resolution, device, precision, tuple(overrides or ()))
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: make_mesh(order, shell, level=level, close=not no_close)
+    return lambda: make_mesh(order, context.obj, level=level, close=not no_close)

@@ -21,12 +21,11 @@ from clfractal.cli.options import (
     Size,
     Verbose,
     Work,
-    app,
-    shell_of,
+    command,
 )
 
 
-@app.command()
+@command
 def render(
     context: typer.Context,
     scene: Scene,
@@ -81,11 +80,10 @@ def render(
         quality=quality,
         denoise=denoise,
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: render_scene(order, shell)
+    return lambda: render_scene(order, context.obj)
 
 
-@app.command()
+@command
 def animate(
     context: typer.Context,
     scene: Scene,
@@ -159,16 +157,15 @@ def animate(
         resume=resume,
         stats=stats,
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
     recipe = Recipe(codec, bits, chroma, crf)
     if missing:
-        return lambda: list_missing(order, Part(frames), shell)
+        return lambda: list_missing(order, Part(frames), context.obj)
     if preview is not None:
-        return lambda: preview_film(order, preview, Part(frames), shell)
-    return lambda: animate_scene(order, Part(frames), recipe, shell)
+        return lambda: preview_film(order, preview, Part(frames), context.obj)
+    return lambda: animate_scene(order, Part(frames), recipe, context.obj)
 
 
-@app.command()
+@command
 def sound(
     context: typer.Context,
     source: Annotated[str, typer.Argument(metavar="FILE.wav", help="A WAV file.")],
@@ -206,11 +203,10 @@ def sound(
     order = SoundOrder(
         Path(source), output, fps, frames, tuple(band or ()), not absolute, threshold, fade, gain
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: write_loudness(order, shell)
+    return lambda: write_loudness(order, context.obj)
 
 
-@app.command()
+@command
 def slices(
     context: typer.Context,
     scene: Scene,
@@ -256,11 +252,10 @@ def slices(
         samples=samples,
     )
     stack = Stack(count, spacing, start)
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: render_slices(order, stack, shell)
+    return lambda: render_slices(order, stack, context.obj)
 
 
-@app.command()
+@command
 def vary(
     context: typer.Context,
     scene: Scene,
@@ -302,5 +297,4 @@ def vary(
 
     order = Order(scene=scene, device=device, size=size, overrides=tuple(overrides or ()))
     choice = Choice(output, count, strength, seed, sheet, only)
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: vary_scene(order, choice, shell)
+    return lambda: vary_scene(order, choice, context.obj)

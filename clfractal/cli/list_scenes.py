@@ -19,13 +19,12 @@ from clfractal.cli.options import (
     Size,
     Verbose,
     Work,
-    app,
-    shell_of,
+    command,
 )
 from clfractal.errors import FileError, Where
 
 
-@app.command()
+@command
 def scenes(
     context: typer.Context,
     names: Annotated[
@@ -47,23 +46,22 @@ def scenes(
     """List the scenes that come with the program, print one, or show them in a picture."""
     from clfractal.cli.show_scenes import draw_sheet, list_scenes, tell_scene
 
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
     wanted = names or []
 
     def work() -> None:
         if sheet is not None:
-            draw_sheet(wanted, sheet, device, shell)
+            draw_sheet(wanted, sheet, device, context.obj)
         elif len(wanted) > 1:
             raise FileError(
                 f"prints one scene, got {len(wanted)}; --sheet shows several", Where("clfractal scenes")
             )
         else:
-            shell.print(tell_scene(wanted[0]) if wanted else list_scenes())
+            context.obj.print(tell_scene(wanted[0]) if wanted else list_scenes())
 
     return work
 
 
-@app.command()
+@command
 def new(
     context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="NAME", help="The file to write; .yaml may be left out.")],
@@ -83,11 +81,10 @@ def new(
     """Write a scene to start from: all of a formula in the picture, in a good light, with comments."""
     from clfractal.cli.new import new_scene
 
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: new_scene(name, formula, device, shell)
+    return lambda: new_scene(name, formula, device, context.obj)
 
 
-@app.command()
+@command
 def watch(
     context: typer.Context,
     scene: Scene,
@@ -120,5 +117,4 @@ def watch(
         samples=samples,
         quality=quality,
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    return lambda: watch_scene(order, shell)
+    return lambda: watch_scene(order, context.obj)

@@ -7,10 +7,10 @@ from typing import Annotated
 
 import typer
 
-from clfractal.cli.options import DeviceOption, Overrides, Quiet, Verbose, Work, app, shell_of
+from clfractal.cli.options import DeviceOption, Overrides, Quiet, Verbose, Work, command
 
 
-@app.command()
+@command
 def view(
     context: typer.Context,
     scene: Annotated[
@@ -96,6 +96,5 @@ def view(
         panels,
         share,
     )
-    shell = shell_of(context, quiet=quiet, verbose=verbose)
-    shell.patient = False  # the window shows what takes long
-    return lambda: work(options, shell)
+    context.obj.patient = False  # the window shows what takes long
+    return lambda: work(options, context.obj)

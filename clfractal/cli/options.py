@@ -1,4 +1,4 @@
-"""What the lists of commands share: the Typer application and options that several commands have.
+"""What the lists of commands share: the Typer application, how a command is made, and options that several have.
 
 Each command's work is imported when it is called.
 """
@@ -6,7 +6,8 @@ Each command's work is imported when it is called.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated
+from functools import wraps
+from typing import Annotated, Any
 
 import typer
 
@@ -104,9 +105,14 @@ Verbose = Annotated[
 ]
 
 
-def shell_of(context: typer.Context, *, quiet: bool = False, verbose: bool = False) -> Shell:
-    """The shell that `call` was given."""
-    shell = context.obj
-    assert isinstance(shell, Shell)
-    shell.quiet, shell.verbose = quiet, verbose
-    return shell
+def command(function: Callable[..., Work]) -> Callable[..., Work]:
+    """Makes a function a command of its name; its options say how much the shell tells, which is `context.obj`."""
+
+    @app.command()
+    @wraps(function)
+    def read(**given: Any) -> Work:
+        shell: Shell = given["context"].obj
+        shell.quiet, shell.verbose = given.get("quiet", False), given.get("verbose", False)
+        return function(**given)
+
+    return read

@@ -29,7 +29,13 @@ class Kind:
 
 
 class Element(Section, Kind):
-    """A section that is one of several kinds."""
+    """A section that is one of several kinds; if it has a key `type`, that has its word."""
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **_options: Any) -> None:
+        """Takes the word from the key."""
+        if "type" in cls.model_fields:
+            cls.tag = cls.model_fields["type"].default
 
 
 K = TypeVar("K", bound=Kind)

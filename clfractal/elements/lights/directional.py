@@ -12,7 +12,6 @@ from clfractal.schema.light import SmallLight
 class DirectionalLight(SmallLight):
     """Light from infinitely far away."""
 
-    tag = "directional"
     title = "Sun"
     about = "from infinitely far away"
     place = 10

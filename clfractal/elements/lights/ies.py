@@ -25,7 +25,6 @@ class IesLight(SmallLight):
     Between the file's angles it is mixed linearly; outside of them it is dark.
     """
 
-    tag = "ies"
     title = "IES"
     about = "of a measured luminaire"
     place = 35

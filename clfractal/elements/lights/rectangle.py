@@ -13,7 +13,6 @@ from clfractal.schema.record import Number
 class RectangleLight(SingleLight):
     """A rectangle that shines on one side; `intensity` times the colour is the radiance that it shows."""
 
-    tag = "rectangle"
     title = "Area"
     about = "of a rectangle"
     place = 50

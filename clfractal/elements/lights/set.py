@@ -20,7 +20,6 @@ class SetLight(LightBase):
     They are for surface renderers.
     """
 
-    tag = "set"
     title = "Set"
     about = "of many balls on the set"
     place = 60

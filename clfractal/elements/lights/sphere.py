@@ -12,7 +12,6 @@ from clfractal.schema.record import Number
 class SphereLight(SingleLight):
     """A ball that shines evenly; `intensity` times the colour is the radiance that it shows."""
 
-    tag = "sphere"
     title = "Ball"
     about = "of a ball"
     place = 40

@@ -13,7 +13,6 @@ from clfractal.schema.shape import Sides, Solid
 class BoxObject(Solid):
     """A box."""
 
-    tag = "box"
     title = "Box"
     place = 40
     type: Literal["box"] = "box"

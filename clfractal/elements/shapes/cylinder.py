@@ -12,7 +12,6 @@ from clfractal.schema.shape import Solid
 class CylinderObject(Solid):
     """A cylinder with lids; its axis is z before it is rotated."""
 
-    tag = "cylinder"
     title = "Cylinder"
     place = 50
     type: Literal["cylinder"] = "cylinder"

@@ -12,7 +12,6 @@ from clfractal.schema.shape import Solid
 class SphereObject(Solid):
     """A ball, or with `scale` an ellipsoid."""
 
-    tag = "sphere"
     title = "Sphere"
     place = 30
     type: Literal["sphere"] = "sphere"
