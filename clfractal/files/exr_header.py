@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import struct
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -82,12 +83,8 @@ class ExrHeader:
     def channels(self) -> tuple[str, ...]:
         """The names of the channels, in the file's order; those before the first thing that is wrong with the list."""
         attribute = self.attributes.get("channels")
-        names, data = [], attribute.data if attribute else b""
-        while data and data[0]:
-            name, _, rest = data.partition(b"\0")
-            names.append(name.decode("utf-8", "replace"))
-            data = rest[16:]
-        return tuple(names)
+        found = _channel_list(attribute.data if attribute else b"")
+        return tuple(name.decode("utf-8", "replace") for name, _ in found)
 
 
 def _texts(data: bytes) -> tuple[str, ...]:
@@ -171,19 +168,26 @@ def _parse(stream: BinaryIO) -> ExrHeader:
         attributes[name] = Attribute(kind, _exactly(stream, length), offset)
 
 
+def _channel_list(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """The names of channels, and what is told of each; less than 16 bytes where the list ends too early."""
+    while data and data[0]:
+        name, _, rest = data.partition(b"\0")
+        yield name, rest[:16]
+        data = rest[16:]
+
+
 def _channel_bytes(data: bytes) -> int:
     """Bytes of one pixel: the sum over the channel list."""
-    total = 0
-    while data and data[0]:
-        _, _, rest = data.partition(b"\0")
-        if len(rest) < 16:
+    total, length = 0, 1
+    for name, told in _channel_list(data):
+        if len(told) < 16:
             break
-        kind, across, down = struct.unpack("<i4xii", rest[:16])
+        kind, across, down = struct.unpack("<i4xii", told)
         if kind not in _PIXEL_BYTES or across != 1 or down != 1:
             raise ContentError("is damaged, or has sub-sampled channels")
         total += _PIXEL_BYTES[kind]
-        data = rest[16:]
-    if data != b"\0" or not total:
+        length += len(name) + 17
+    if data[length - 1 :] != b"\0" or not total:
         raise ContentError("is damaged: its list of channels is not valid")
     return total
 

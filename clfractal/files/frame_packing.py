@@ -40,23 +40,23 @@ def frame_packing(library: str, mode: str, *, swap: bool) -> bytes:
         swap: whether the right eye's picture comes first.
     """
     is_h264 = library == "libx264"
-    bits = _Bits()
-    bits.unsigned(0)  # id
-    bits.put(0, 1)  # it cancels none
-    bits.put(TYPES[mode], 7)
-    bits.put(TYPES[mode] == _CHECKERBOARD, 1)  # quincunx sampling
-    bits.put(_RIGHT_FIRST if swap else _LEFT_FIRST, 6)
-    bits.put(0, 6)  # nothing is flipped, no fields, and no picture can be decoded without the other
-    if TYPES[mode] != _CHECKERBOARD:
-        bits.put(0, 16)  # where samples lie within those of the whole picture: at its upper left
-    bits.put(0, 8)  # reserved
-    if is_h264:
-        bits.unsigned(1)  # it holds until the next one
-        bits.put(0, 1)  # no extension
-    else:
-        bits.put(1, 1)  # it holds until the next one
-        bits.put(0, 1)  # the pixels' shape is that of the whole picture
-    payload = bits.closed()
+    is_checkered = TYPES[mode] == _CHECKERBOARD
+    bits = [
+        _unsigned(0),  # id
+        "0",  # it cancels none
+        f"{TYPES[mode]:07b}",
+        f"{is_checkered:b}",  # quincunx sampling
+        f"{_RIGHT_FIRST if swap else _LEFT_FIRST:06b}",
+        "000000",  # nothing is flipped, no fields, and no picture can be decoded without the other
+        ""
+        if is_checkered
+        else f"{0:016b}",  # where samples lie within the whole picture's: at its upper left
+        f"{0:08b}",  # reserved
+        # It holds until the next one; then no extension, or the pixels' shape is that of the whole picture.
+        _unsigned(1) if is_h264 else "1",
+        "0",
+    ]
+    payload = _closed("".join(bits))
     header = b"\x06" if is_h264 else b"\x4e\x01"  # a message before the slices: types 6 and 39
     return _guarded(header + bytes((_PAYLOAD, len(payload))) + payload + b"\x80")
 
@@ -78,28 +78,18 @@ def _is_slice(first: int, library: str) -> bool:
     return 1 <= first & 31 <= 5 if library == "libx264" else first >> 1 & 63 < 32
 
 
-class _Bits:
-    """Bits that are written one after the other."""
+def _unsigned(value: int) -> str:
+    """A whole number by an Exp-Golomb code: ue(v)."""
+    code = format(value + 1, "b")
+    return "0" * (len(code) - 1) + code
 
-    def __init__(self) -> None:
-        self.text = ""
 
-    def put(self, value: int, count: int) -> None:
-        """A whole number in so many bits."""
-        self.text += format(int(value), f"0{count}b")
-
-    def unsigned(self, value: int) -> None:
-        """A whole number by an Exp-Golomb code: ue(v)."""
-        code = format(value + 1, "b")
-        self.text += "0" * (len(code) - 1) + code
-
-    def closed(self) -> bytes:
-        """The bytes; if bits are missing to a whole one, a one and zeros."""
-        text = self.text
-        if len(text) % 8:
-            text += "1"
-            text += "0" * (-len(text) % 8)
-        return int(text, 2).to_bytes(len(text) // 8, "big")
+def _closed(bits: str) -> bytes:
+    """The bytes; if bits are missing to a whole one, a one and zeros."""
+    if len(bits) % 8:
+        bits += "1"
+        bits += "0" * (-len(bits) % 8)
+    return int(bits, 2).to_bytes(len(bits) // 8, "big")
 
 
 def _guarded(data: bytes) -> bytes:

@@ -86,6 +86,13 @@ class Node:
             return found if isinstance(found, Node) else None
         return None
 
+    def under(self, path: Sequence[str | int]) -> Node | None:
+        """The value at a path, or None."""
+        node: Node | None = self
+        for part in path:
+            node = node.child(part) if node is not None else None
+        return node
+
 
 @dataclass(frozen=True, slots=True)
 class Document:
@@ -139,10 +146,7 @@ class Document:
 
     def has(self, path: Sequence[str | int]) -> bool:
         """Whether there is a value at `path`."""
-        node: Node | None = self.root
-        for part in path:
-            node = node.child(part) if node is not None else None
-        return node is not None
+        return self.root.under(path) is not None
 
     def end(self, path: Sequence[str | int]) -> tuple[int, int]:
         """Line and column after the value at `path`, or after what is left of the path."""

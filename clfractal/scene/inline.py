@@ -25,9 +25,7 @@ def inlined(document: Document, folder: Path) -> Document:
         FormulaError: a file is not YAML, or there is no formula of a name.
     """
     for path in _formulas(document):
-        formula: Node | None = document.root
-        for part in path:
-            formula = formula.child(part) if formula is not None else None
+        formula = document.root.under(path)
         if formula is None:
             continue
         try:

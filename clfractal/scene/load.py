@@ -19,7 +19,7 @@ from clfractal.files.document import MAX_DEPTH, read_document, read_value, write
 from clfractal.files.embedded import read_scene_text
 from clfractal.files.file_kinds import kind_of
 from clfractal.files.inputs import noting
-from clfractal.files.marks import Document, Node, node_from_plain, option
+from clfractal.files.marks import Document, node_from_plain, option
 from clfractal.files.regular import read_text_file
 from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
@@ -44,9 +44,7 @@ class SceneText:
 
     def value(self, *path: str) -> Any:
         """The plain value at a path; None if there is none."""
-        node: Node | None = self.document.root
-        for part in path:
-            node = node.child(part) if node is not None else None
+        node = self.document.root.under(path)
         return node.plain() if node is not None else None
 
 
