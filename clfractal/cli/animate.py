@@ -225,7 +225,9 @@ def _render_on(
                 paths,
                 shell,
                 resume=order.resume,
-                keep=each is None or each > _LONG_FRAME or _partial(paths).exists(),
+                keep=each is None
+                or each > _LONG_FRAME
+                or paths[0].with_name(paths[0].name + PARTIAL).exists(),
                 bits=kept.at(number),
             )
             counted.rendered(made.state.rays)
@@ -264,10 +266,6 @@ def _planned_films(order: Order, scene: Scene, recipe: Recipe, fps: float) -> li
         raise SceneError("must be a colour or a gradient for a film, which is not transparent", where)
     mode, swap = (scene.stereo.mode, scene.stereo.swap) if scene.stereo is not None else (None, False)
     return [plan_film(path, recipe, content.size, fps, stereo=mode, swap=swap) for path in films]
-
-
-def _partial(paths: tuple[Path, ...]) -> Path:
-    return paths[0].with_name(paths[0].name + PARTIAL)
 
 
 def _is_there(job: Job, paths: tuple[Path, ...], bits: Mapping[Path, int]) -> bool:

@@ -228,8 +228,9 @@ class _Moved:
         given = scene.model_dump(mode="json", exclude_unset=True)
         given["formula"] = scene.formula.mapping()
         short = {name: value for name, value in given.items() if value not in (None, {}) or name == "formula"}
+        plainest = Scene.model_validate({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
         for name in ("lights", "cut_planes"):
-            if getattr(scene, name) == getattr(_plainest(), name):
+            if getattr(scene, name) == getattr(plainest, name):
                 short.pop(name, None)
         self._renamed(short)
         return short
@@ -258,7 +259,3 @@ class _Moved:
                 f"uses {file[:80]!r}, which must lie in the variations' folder or below; write them to {self.base} with -o",
                 Where(str(self.source)),
             ) from None
-
-
-def _plainest() -> Scene:
-    return Scene.model_validate({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})

@@ -35,7 +35,8 @@ def view(options: Options, shell: Shell) -> None:
         DeviceError: status 3, no display, no OpenGL 3.3, or the libraries are not installed.
         ClfractalError: a wrong scene or option.
     """
-    _quiet_libraries()
+    # PyOpenGL logs to standard error, where only messages for the user belong.
+    os.environ.setdefault("PYOPENGL_USE_ACCELERATE", "0")
     try:
         import glfw  # noqa: F401
         import imgui_bundle  # noqa: F401
@@ -55,8 +56,3 @@ def view(options: Options, shell: Shell) -> None:
     from clfractal.viewer.app import Viewer
 
     Viewer(begun, settings, remark, shell.say).run()
-
-
-def _quiet_libraries() -> None:
-    # PyOpenGL logs to standard error, where only messages for the user belong.
-    os.environ.setdefault("PYOPENGL_USE_ACCELERATE", "0")

@@ -142,7 +142,8 @@ class _Builder:
         self.count = 0
 
     def fail(self, message: str, line: int, column: int | None) -> NoReturn:
-        path = dotted([p for p in (self._part(open_) for open_ in self.stack) if p is not None])
+        parts = (len(o.node.value) if isinstance(o.node.value, list) else o.key for o in self.stack)
+        path = dotted([part for part in parts if part is not None])
         raise self.error(message, Where(self.file, line, column, path or None))
 
     def fail_at(self, message: str, event: Any) -> NoReturn:
@@ -298,9 +299,6 @@ class _Builder:
         if not math.isfinite(number):
             self.fail_at(f"must be a finite number, got {text}", event)
         return number
-
-    def _part(self, open_: _Open) -> str | int | None:
-        return len(open_.node.value) if isinstance(open_.node.value, list) else open_.key
 
 
 def _merge(node: Node, merged: list[Node]) -> None:

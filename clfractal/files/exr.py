@@ -163,11 +163,6 @@ def _matrix_bytes(value: npt.ArrayLike) -> bytes:
     return matrix.tobytes()
 
 
-def _reason(error: BaseException) -> str:
-    """The last sentence of the library's message: the system's reason, without our temporary file's name."""
-    return str(error).strip().rsplit('". ', 1)[-1].rstrip(".")
-
-
 def to_half(values: Floats, *, data: bool) -> npt.NDArray[np.float16]:
     """Rounds to half precision; out of range becomes +-65504, but infinite `data` stays infinite."""
     limited = np.clip(values, -HALF_MAX, HALF_MAX)
@@ -229,7 +224,9 @@ def _library(path: str | Path, call: Any, *arguments: Any) -> Any:
     try:
         return call(*arguments)
     except (OSError, RuntimeError) as error:
-        raise file_error(path, "cannot be written", _reason(error)) from error
+        # The last sentence of the library's message: the system's reason, without our temporary file's name.
+        reason = str(error).strip().rsplit('". ', 1)[-1].rstrip(".")
+        raise file_error(path, "cannot be written", reason) from error
 
 
 def _replace_attributes(path: str | Path, beside: Path, attributes: Mapping[str, tuple[str, bytes]]) -> None:

@@ -92,7 +92,8 @@ def write_mesh(path: str | Path, mesh: Mesh) -> None:
         raise file_error(path, "cannot be written: the mesh has no triangle", "")
     if suffix in SINGLE_PRECISION and _is_fine(mesh):
         raise file_error(path, f"cannot be written: {TOO_FINE}", "")
-    if suffix == ".glb" and _glb_length(mesh) + 65_536 + 4 * len(mesh.text) > _LARGEST_GLB:
+    glb_length = sum(size * count for _, size, _, _, count in _glb_parts(mesh))
+    if suffix == ".glb" and glb_length + 65_536 + 4 * len(mesh.text) > _LARGEST_GLB:
         raise file_error(path, "cannot be written: the mesh is too large for GLB, which ends at 4 GB", "")
     with atomic_writer(path) as beside, open(beside, "wb", buffering=1 << 20) as stream:
         writers[suffix](stream, mesh, mesh.text)
@@ -220,10 +221,6 @@ def _glb_parts(mesh: Mesh) -> list[tuple[str, int, int, str, int]]:
         parts.append(("COLOR_0", 8, _USHORT, "VEC4", count))
     parts.append(("", 4, _UINT, "SCALAR", 3 * len(mesh.triangles)))
     return parts
-
-
-def _glb_length(mesh: Mesh) -> int:
-    return sum(size * count for _, size, _, _, count in _glb_parts(mesh))
 
 
 def _y_up(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float32]:

@@ -259,7 +259,8 @@ class _Parser:
         ):
             self.fail(f"has a position or direction beyond {LARGEST_NUMBER:g}")
         if not independent(directions):
-            self.fail("must be three steps in different directions, none of them zero", self._steps_name())
+            by = (name for name in ("space directions", "spacings", "axis maxs") if name in self.fields)
+            self.fail("must be three steps in different directions, none of them zero", next(by, None))
         line_skip = self._skip("line skip", 0)
         byte_skip = self._skip("byte skip", -1 if encoding == "raw" else 0)
         if line_skip and encoding in COMPRESSED:
@@ -363,11 +364,6 @@ class _Parser:
             what = f"a vector {vector}" if count == 1 else f"{count} vectors {vector}"
             self.fail(f"must be {what}, got {written[:80]!r}", name)
         return np.array(rows, np.float64)
-
-    def _steps_name(self) -> str | None:
-        return next(
-            (name for name in ("space directions", "spacings", "axis maxs") if name in self.fields), None
-        )
 
     def _geometry(self, sizes: list[int]) -> tuple[Doubles, Doubles]:
         """Origin and directions, by the fields of a space or else by those of single axes."""

@@ -194,7 +194,8 @@ class _Editor:
         old = before if isinstance(before, Mapping) else {}
         names = [key.value for key in node.keys]
         merges = [_is_merge(key) for key in node.keys]
-        taken = _taken_over(names, read) if any(merges) else ()
+        # The keys that the text does not have, but those that it merges.
+        taken = [key for key in read.value if key not in names] if any(merges) else []
         given = self._given(node)
         apart = any(merges) and self._apart(
             node, taken, given, {k: v for k, v in after.items() if k not in names}
@@ -378,11 +379,6 @@ class _Editor:
 def _is_merge(key: spans.Scalar) -> bool:
     """Whether a key merges other mappings."""
     return key.value == MERGE and not key.style
-
-
-def _taken_over(names: Sequence[str], read: Node) -> list[str]:
-    """The keys of a mapping that its text does not have, but those that it merges."""
-    return [key for key in read.value if key not in names]
 
 
 def _pairs(node: spans.Mapping) -> Iterator[tuple[spans.Scalar, spans.Node]]:

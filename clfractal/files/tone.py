@@ -99,12 +99,8 @@ def toned(red: Floats, green: Floats, blue: Floats, tone: Tone) -> tuple[Floats,
     """
     if tone == "linear":
         return red, green, blue
-    limited = tuple(_limited(plane) for plane in (red, green, blue))
+    limited = tuple(np.fmin(np.fmax(plane, np.float32(0)), LIGHTEST) for plane in (red, green, blue))
     return _by_luminance(*limited) if tone == "reinhard" else _by_component(*limited)
-
-
-def _limited(plane: Floats) -> Floats:
-    return np.fmin(np.fmax(plane, np.float32(0)), LIGHTEST)
 
 
 def _weighed(red: Floats, green: Floats, blue: Floats, weights: tuple[np.float32, ...]) -> Floats:

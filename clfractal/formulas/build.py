@@ -78,7 +78,7 @@ class _Builder:
         everything = (*state, *(name for name, _ in let))
         maps = self._map(everything)
         self._check_static_exponents(let, maps)
-        center, radius = self._bounds()
+        center, radius = bounds_from_mapping(self.data["bounds"], known, inside(self.where, "bounds"))
         uses_point = frozenset(point_name(v) for v in self.variables)
         add = self._add()
         return Formula(
@@ -164,16 +164,9 @@ class _Builder:
         return tuple(parse(text, names=names, where=inside(where, str(i))) for i, text in enumerate(texts))
 
     def _of_parameters(self, key: str, default: float) -> Node:
-        return self._parameter_expression(self.data.get(key, default), inside(self.where, key))
-
-    def _parameter_expression(self, value: Any, where: Where, extra: tuple[str, ...] = ()) -> Node:
-        names = (*(p.name for p in self.parameters), *extra)
-        return parse(value, names=names, where=where, parameters_only=True)
-
-    def _bounds(self) -> tuple[tuple[Node, Node, Node], Node]:
-        return bounds_from_mapping(
-            self.data["bounds"], [p.name for p in self.parameters], inside(self.where, "bounds")
-        )
+        names = [p.name for p in self.parameters]
+        where = inside(self.where, key)
+        return parse(self.data.get(key, default), names=names, where=where, parameters_only=True)
 
     def _add(self) -> Add:
         value = self.data.get("add", "point")

@@ -191,14 +191,6 @@ def _floor(x: float) -> float:
     return float(math.floor(x)) if math.isfinite(x) else x
 
 
-def _mod(x: float, y: float) -> float:
-    return x - y * _floor(_divide(x, y))
-
-
-def _log(x: float) -> float:
-    return math.log(max(x, TINY))
-
-
 _FLOAT_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
@@ -219,7 +211,7 @@ _FLOAT_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sign": lambda a: float((a > 0) - (a < 0)),
     "sqrt": lambda a: math.sqrt(a) if a > 0 else 0.0,
     "exp": _exp,
-    "log": _log,
+    "log": lambda a: math.log(max(a, TINY)),
     "log2": lambda a: math.log2(max(a, TINY)),
     "sin": lambda a: _trig(math.sin, a),
     "cos": lambda a: _trig(math.cos, a),
@@ -232,7 +224,7 @@ _FLOAT_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "max": lambda a, b: a if a >= b else b,
     "clamp": lambda a, low, high: min(max(a, low), high),
     "floor": _floor,
-    "mod": _mod,
+    "mod": lambda x, y: x - y * _floor(_divide(x, y)),
     "where": lambda condition, a, b: a if condition else b,
     "cpow_re": lambda x, y, n: _cpow(x, y, n)[0],
     "cpow_im": lambda x, y, n: _cpow(x, y, n)[1],

@@ -308,7 +308,9 @@ class _ChainWriter:
                 "}",
             ]
         # A map written by its Jacobian is made of real statements; what is added to it is not.
-        adder = self._adder(index, number_type) if emitter.number_type != number_type else emitter
+        adder = emitter
+        if emitter.number_type != number_type:
+            adder = Emitter(number_type, {}, self.constants, index, prefix="u")
         texts = self._add_constant(index, number_type, adder, mapped)
         lines = passes + (emitter.lines if adder is emitter else [*emitter.lines, *adder.lines])
         return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
@@ -320,10 +322,6 @@ class _ChainWriter:
         if usual or not names_in(formula.repeat):
             return str(round(evaluate_constant(formula.repeat, formula.shaping)))
         return f"(int)k[{self.constants.slot((index, 'repeat', 0))}]"
-
-    def _adder(self, index: int, number_type: NumberType) -> Emitter:
-        """Writes statements after those of the map."""
-        return Emitter(number_type, {}, self.constants, index, prefix="u")
 
     def _by_local_jacobian(self, index: int, *, usual: bool) -> tuple[Emitter, list[str]]:
         """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""

@@ -158,9 +158,6 @@ class _Parser:
         except ValueError:
             self.fail("cannot be read", 1)
 
-    def _position(self, tree: ast.AST) -> int:
-        return int(getattr(tree, "col_offset", 0)) + self.offset + 1
-
     def _count(self, position: int, depth: int, nodes: int = 1) -> None:
         self.nodes += nodes
         if self.nodes > MAX_NODES:
@@ -169,7 +166,7 @@ class _Parser:
             self.fail(f"nested more than {MAX_DEPTH} levels deep", position)
 
     def _node(self, tree: ast.expr, depth: int) -> Node:
-        position = self._position(tree)
+        position = int(getattr(tree, "col_offset", 0)) + self.offset + 1
         self._count(position, depth)
         if isinstance(tree, ast.Constant):
             return self._number(tree.value, position)

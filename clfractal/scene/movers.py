@@ -199,7 +199,7 @@ class Movers:
             logarithms = [tuple(log(number) for number in each) for each in values]
             smooth = _Exponential(_together(times, logarithms, closed=closed))
             return Spans(times, values, ways, smooth, _geometric)
-        return _components(times, values, ways, closed=closed)
+        return Spans(times, values, ways, _together(times, values, closed=closed), straight)
 
     def _flight_of(self, name: str) -> str | None:
         """The track of the position of a camera that flies round its target, if this is it, or its target's; else None."""
@@ -350,12 +350,6 @@ def _along(
     times: Sequence[float], values: Sequence[Values], ways: Sequence[Values | None], mix: Mix, *, closed: bool
 ) -> Curve:
     return Spans(times, values, ways, Path(times, values, mix, closed=closed), mix)
-
-
-def _components(
-    times: Sequence[float], values: Sequence[Values], ways: Sequence[Values | None], *, closed: bool
-) -> Curve:
-    return Spans(times, values, ways, _together(times, values, closed=closed), straight)
 
 
 def _together(times: Sequence[float], values: Sequence[Values], *, closed: bool) -> Curve:

@@ -105,7 +105,8 @@ def _below(value: Any, path: Sequence[str], depth: int) -> Any:
     part, shown = path[depth], ".".join(path[:depth])
     if isinstance(value, Section):
         if part not in _keys_of(value):
-            raise SceneError(_unknown(part, shown, _keys_of(value)))
+            what = f"key of {shown}" if shown else "key"
+            raise SceneError(unknown_name(what, part, _keys_of(value)))
         return value_under(value, part)
     if isinstance(value, Mapping):
         if shown in _NAMED and part not in value:
@@ -129,10 +130,6 @@ def value_under(section: Section, key: str) -> Any:
 def _keys_of(section: Section) -> list[str]:
     """The keys of a section, in the schema's order."""
     return list(type(section).model_fields)
-
-
-def _unknown(part: str, shown: str, known: Sequence[str]) -> str:
-    return unknown_name(f"key of {shown}" if shown else "key", part, known)
 
 
 def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
