@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Self
 from clfractal.cli.shell import Shell
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import naming
 from clfractal.files.frame_names import frame_file, kept_folder, kept_patterns
 
 if TYPE_CHECKING:
@@ -58,13 +58,11 @@ class Kept:
     def __enter__(self) -> Self:
         if self._folder is None:
             return self
-        try:
+        with naming(self._folder, "cannot be used"):
             if self._folder.exists():
                 self._files()
             else:
                 self._folder.mkdir()
-        except OSError as error:
-            raise file_error(self._folder, "cannot be used", error) from error
         return self
 
     def __exit__(

@@ -18,7 +18,7 @@ from typing import BinaryIO
 from clfractal.cli.shell import OUTPUT, Shell
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import naming
 from clfractal.files.file_kinds import kind_of_start
 from clfractal.files.regular import MAX_BYTES
 
@@ -105,16 +105,13 @@ def _spool(path: Path) -> None:
         raise FileError("is closed", Where(INPUT))
     stream: BinaryIO = sys.stdin.buffer
     size, limit = 0, MAX_BYTES
-    try:
-        with open(path, "wb") as file:
-            while piece := stream.read(_PIECE):
-                if size == 0 and kind_of_start(piece) is not None:
-                    limit = _LARGEST
-                size += len(piece)
-                if size > limit:
-                    raise FileError(f"is too large: at most {limit:,} bytes", Where(INPUT))
-                file.write(piece)
-    except (OSError, ValueError) as error:
-        raise file_error(INPUT, "cannot be read", error) from error
+    with naming(INPUT, "cannot be read"), open(path, "wb") as file:
+        while piece := stream.read(_PIECE):
+            if size == 0 and kind_of_start(piece) is not None:
+                limit = _LARGEST
+            size += len(piece)
+            if size > limit:
+                raise FileError(f"is too large: at most {limit:,} bytes", Where(INPUT))
+            file.write(piece)
     if size == 0:
         raise FileError("holds no scene: it is empty", Where(INPUT))

@@ -27,7 +27,7 @@ from clfractal.engine.variations import (
 )
 from clfractal.engine.varied import Kind, Strength
 from clfractal.errors import FileError, SceneError, Where, speaking_of, unknown_name
-from clfractal.files.atomic import atomic_writer, check_output, file_error
+from clfractal.files.atomic import atomic_writer, check_output, naming
 from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
@@ -176,10 +176,8 @@ def _check_files(scene: Scene, choice: Choice, names: Sequence[str]) -> None:
             raise FileError(f"exists already and is not replaced; choose another {other}", Where(str(file)))
     for sheet in choice.sheets:
         check_picture(sheet)
-    try:
+    with naming(choice.folder, "cannot be made"):
         choice.folder.mkdir(exist_ok=True)
-    except OSError as error:
-        raise file_error(choice.folder, "cannot be made", error) from error
     check_output(files[0], (".yaml",))
     refuse_overwriting([*files, *choice.sheets], scene.files)
 

@@ -31,6 +31,15 @@ def file_error(path: str | Path, what: str, error: Exception | str) -> FileError
     return FileError(f"{what}: {reason}" if reason else what, Where(str(path)))
 
 
+@contextmanager
+def naming(path: str | Path, what: str) -> Iterator[None]:
+    """The system's errors in this block become one line about a file, see `file_error`."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise file_error(path, what, error) from error
+
+
 def _target(path: str | Path) -> Path:
     """The file that a name refers to: a symbolic link is kept, and the file it points to is replaced."""
     return Path(os.path.realpath(path))
@@ -59,7 +68,7 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
             f"unknown extension {suffix!r}; known: {known}" if suffix else f"needs an extension: {known}",
             "",
         )
-    try:
+    with naming(path, "cannot be written"):
         target = _target(path)
         if target.is_symlink():
             raise file_error(path, "cannot be written: it is a link that leads to itself", "")
@@ -80,8 +89,6 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
         descriptor, beside = _open_beside(target)
         os.close(descriptor)
         beside.unlink()
-    except (OSError, ValueError) as error:
-        raise file_error(path, "cannot be written", error) from error
 
 
 @contextmanager
@@ -93,11 +100,9 @@ def atomic_writer(path: str | Path) -> Iterator[Path]:
     Raises:
         FileError: any OSError inside the block, while bringing the file to the disk, or while renaming.
     """
-    try:
+    with naming(path, "cannot be written"):
         target = _target(path)
         descriptor, beside = _open_beside(target)
-    except (OSError, ValueError) as error:
-        raise file_error(path, "cannot be written", error) from error
     try:
         yield beside
         os.fsync(descriptor)
@@ -145,12 +150,10 @@ def open_regular(path: str | Path) -> BinaryIO:
         FileError: there is none, or it cannot be read.
     """
     note(path)
-    try:
+    with naming(path, "cannot be read"):
         descriptor = os.open(path, system.READ)
         mode = os.fstat(descriptor).st_mode
         if stat.S_ISREG(mode):
             return os.fdopen(descriptor, "rb")
         os.close(descriptor)
-    except (OSError, ValueError) as error:
-        raise file_error(path, "cannot be read", error) from error
     raise file_error(path, "is a folder, not a file" if stat.S_ISDIR(mode) else "is not a regular file", "")

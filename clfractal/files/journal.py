@@ -36,7 +36,7 @@ import numpy.typing as npt
 
 from clfractal.errors import FileError, Where
 from clfractal.files import system
-from clfractal.files.atomic import file_error
+from clfractal.files.atomic import file_error, naming
 
 Floats = npt.NDArray[np.float32]
 
@@ -94,10 +94,8 @@ class Journal:
             raise ValueError(f"{tile_count} tiles in one journal")
         text = _identity_text(identity, channels, tile_count)
         beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
-        try:
+        with naming(target, "cannot be written"):
             descriptor = os.open(beside, system.CREATE, 0o666)
-        except (OSError, ValueError) as error:
-            raise file_error(target, "cannot be written", error) from error
         try:
             with suppress(OSError):  # a file system without locks
                 system.lock(descriptor)
@@ -214,10 +212,8 @@ class Journal:
         place = int(self._place[tile_index])
         if place < 0:
             raise KeyError(tile_index)
-        try:
+        with naming(self.path, "cannot be read"):
             found = self._record(place)
-        except OSError as error:
-            raise file_error(self.path, "cannot be read", error) from error
         if found is None or found[0] % (1 << _INDEX_BITS) != tile_index:
             raise file_error(self.path, f"is damaged: tile {tile_index} has changed since it was written", "")
         return found[1].reshape(len(self.channels), SIDE, SIDE)
@@ -240,10 +236,8 @@ class Journal:
         """Appends a record, and gives its number."""
         check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", index)))
         offset = self._start + self._records * self._size
-        try:
+        with naming(self.path, "cannot be written"):
             system.write_at(self._descriptor, [_RECORD.pack(index, check), payload], offset)
-        except OSError as error:
-            raise file_error(self.path, "cannot be written", error) from error
         self._records += 1
         return self._records - 1
 

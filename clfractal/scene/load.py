@@ -209,18 +209,10 @@ def _overridden(document: Document, override: str) -> Document:
     index = next((i for i, part in enumerate(parts) if part.isdecimal()), 0)
     if index and not document.has(parts[:index]):
         # An entry of a list that is not in the file but in its default.
-        default = _default(parts[:index])
-        if isinstance(default, list):
-            document = document.replaced(parts[:index], node_from_plain(default, label))
+        default = node_from_plain(_defaults(), label).under(parts[:index])
+        if default is not None and isinstance(default.value, list):
+            document = document.replaced(parts[:index], default)
     return document.replaced(parts, value)
-
-
-def _default(path: Sequence[str]) -> Any:
-    """The default at a path, or None."""
-    value: Any = _defaults()
-    for part in path:
-        value = value.get(part) if isinstance(value, dict) else None
-    return value
 
 
 def _defaults() -> dict[str, Any]:
