@@ -38,6 +38,7 @@ class EscapeColors(Section):
 class CutPlaneRenderer(Sampled):
     """The formula on a plane: escape counts as colours, one evaluation for each sample."""
 
+    tag = "cut_plane"
     title = "Plane"
     place = 30
     is_flat = True

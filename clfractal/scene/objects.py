@@ -57,6 +57,7 @@ class Waves(Section):
 class WaterObject(Level):
     """A plane without an end, on which waves travel."""
 
+    tag = "water"
     title = "Water"
     place = 20
     of_rays = True
@@ -85,6 +86,7 @@ def ball_of_both(a: Ball, b: Ball) -> Ball:
 class FormulaObject(Joined):
     """The set of another formula, or of the same one at another place."""
 
+    tag = "formula"
     title = "Formula"
     place = 80
     type: Literal["formula"] = "formula"
@@ -116,6 +118,7 @@ class FormulaObject(Joined):
 class VolumeObject(ObjectBase):
     """A grid of values from a file: a surface where they pass a level, or along paths a cloud."""
 
+    tag = "volume"
     title = "Volume"
     place = 90
     of_rays = True

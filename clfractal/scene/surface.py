@@ -44,6 +44,7 @@ class AmbientOcclusion(Section):
 class SurfaceRenderer(Sampled):
     """The boundary of the set, found by marching along each ray."""
 
+    tag = "surface"
     title = "Surface"
     place = 10
     shows_every_object = True

@@ -123,6 +123,7 @@ def _shows(stops: list[tuple[float, float]], value: float) -> bool:
 class VolumeRenderer(Sampled):
     """Rays through a grid of voxels, front to back, until nothing shines through."""
 
+    tag = "volume"
     title = "Volume"
     place = 20
     has_own_colors = True

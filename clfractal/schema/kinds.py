@@ -18,8 +18,8 @@ class Kind:
     """One of several: by itself what a word chooses whose keys stand in a section that all kinds share.
 
     Attributes:
-        tag: the word that chooses it.
-        title: its name in the window.
+        tag: the word that chooses it; in `clfractal/elements` it is the name of the file.
+        title: its name in the window; there that word, if it tells none.
         place: kinds follow each other by this number where users see them.
     """
 
@@ -27,15 +27,17 @@ class Kind:
     title: ClassVar[str] = ""
     place: ClassVar[int] = 0
 
+    def __init_subclass__(cls) -> None:
+        """Names the kind by its file."""
+        super().__init_subclass__()
+        folder, _, name = cls.__module__.rpartition(".")
+        if folder.startswith("clfractal.elements."):
+            cls.tag = name
+            cls.title = vars(cls).get("title") or name.replace("_", " ").capitalize()
+
 
 class Element(Section, Kind):
-    """A section that is one of several kinds; if it has a key `type`, that has its word."""
-
-    @classmethod
-    def __pydantic_init_subclass__(cls, **_options: Any) -> None:
-        """Takes the word from the key."""
-        if "type" in cls.model_fields:
-            cls.tag = cls.model_fields["type"].default
+    """A section that is one of several kinds."""
 
 
 K = TypeVar("K", bound=Kind)

@@ -6,8 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class CurvatureColoring(ColoringKind):
     """the mean curvature over `step`, one over scene units, above 0 on hills"""
 
-    tag = "curvature"
-    title = "Curvature"
     place = 70
     known = "by_formula"
     keys = ("step",)

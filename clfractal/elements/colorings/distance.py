@@ -6,8 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class DistanceColoring(ColoringKind):
     """that from `center`, scene units"""
 
-    tag = "distance"
-    title = "Distance"
     place = 60
     keys = ("center",)
     of_scenes = False

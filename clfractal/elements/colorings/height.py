@@ -6,8 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class HeightColoring(ColoringKind):
     """the place along `direction`"""
 
-    tag = "height"
-    title = "Height"
     place = 50
     keys = ("direction",)
     of_scenes = False

@@ -6,8 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class IterationsColoring(ColoringKind):
     """the smooth escape count"""
 
-    tag = "iterations"
-    title = "Iterations"
     place = 30
     of_surface = True
     unit = "applications"

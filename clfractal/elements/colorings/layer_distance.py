@@ -6,7 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class LayerDistanceColoring(ColoringKind):
     """from the surface to the surface after `layer` iterations, scene units"""
 
-    tag = "layer_distance"
     title = "Distance to a layer"
     place = 90
     known = "by_formula"

@@ -8,8 +8,6 @@ from clfractal.schema.quantity import ColoringKind
 class NormalColoring(ColoringKind):
     """the normal's x, y, z as red, green, blue, from -1..1 to 0..1; of maps its part along `direction`"""
 
-    tag = "normal"
-    title = "Normal"
     place = 20
     keys = ("direction",)
     uses_palette = False

@@ -6,7 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class ResidualColoring(ColoringKind):
     """how far the pixel's points are from the plane fitted to them, in footprints"""
 
-    tag = "residual"
     title = "Roughness (residual)"
     place = 40
     known = "with_points"

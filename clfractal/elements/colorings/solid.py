@@ -8,7 +8,6 @@ from clfractal.schema.quantity import ColoringKind
 class SolidColoring(ColoringKind):
     """material.color"""
 
-    tag = "solid"
     title = "One colour"
     place = 10
     of_maps = uses_palette = False

@@ -6,8 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class ThicknessColoring(ColoringKind):
     """from where `along` enters the set to where it leaves it, scene units"""
 
-    tag = "thickness"
-    title = "Thickness"
     place = 80
     known = "by_formula"
     keys = ("along", "step")

@@ -6,7 +6,6 @@ from clfractal.schema.quantity import ColoringKind
 class TrapColoring(ColoringKind):
     """the smallest distance of the orbit from a shape"""
 
-    tag = "trap"
     title = "Orbit trap"
     place = 100
     known = "by_formula"

@@ -11,7 +11,6 @@ from clfractal.schema.light import SmallLight
 class PointLight(SmallLight):
     """Light from a point, which shines in all directions."""
 
-    title = "Point"
     about = "from a point"
     place = 20
     type: Literal["point"] = "point"

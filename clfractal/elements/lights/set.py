@@ -20,7 +20,6 @@ class SetLight(LightBase):
     They are for surface renderers.
     """
 
-    title = "Set"
     about = "of many balls on the set"
     place = 60
     is_seen = True

@@ -13,7 +13,6 @@ from clfractal.schema.record import Number
 class SpotLight(SmallLight):
     """Light from a point into a cone."""
 
-    title = "Spot"
     about = "in a cone"
     place = 30
     numbers = (

@@ -9,7 +9,6 @@ from clfractal.schema.material import Part
 class Base(Part):
     """The body: diffuse, or a metal."""
 
-    tag = "base"
     place = 10
     zero_if_matt = ("metalness", "diffuse_roughness")
     weight: FractionMap = Field(1.0, description="factor on the colour")

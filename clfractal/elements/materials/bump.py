@@ -15,7 +15,6 @@ HeightMap = Annotated[Annotated[Coordinate, Tag("given")] | Annotated[NumberMap,
 class Bump(Part):
     """A relief that only light sees: the surface stays where it is, and its shading normal is that of the relief."""
 
-    tag = "bump"
     place = 80
     zero_if_matt = ()
     at_spots = False

@@ -12,7 +12,6 @@ from clfractal.schema.material import WHITE, IorMap, Part
 class Coat(Part):
     """A clear layer over the body."""
 
-    tag = "coat"
     place = 30
     weight: FractionMap = Field(0.0, description="part of the surface that has it")
     color: ReflectanceMap = Field(WHITE, description="what passes through it, there and back")

@@ -15,7 +15,6 @@ ShineMap = Annotated[Annotated[Color, Tag("given")] | Annotated[ColorMap, Tag("m
 class Emission(Part):
     """Light of the material's own."""
 
-    tag = "emission"
     place = 70
     zero_if_matt = ("luminance",)
     luminance: Annotated[AmountMap, Usual(0, 4)] = Field(0.0, description="radiance, as of `background`")

@@ -14,7 +14,6 @@ StandMap = Annotated[Annotated[Stand, Tag("given")] | Annotated[NumberMap, Tag("
 class Fuzz(Part):
     """Short fibres over everything: dust, velvet."""
 
-    tag = "fuzz"
     place = 40
     weight: FractionMap = Field(0.0, description="how dense they are")
     color: ReflectanceMap = Field(WHITE, description="linear Rec. 709")

@@ -13,7 +13,6 @@ from clfractal.schema.material import WHITE, IorMap, Part
 class Specular(Part):
     """What the body's boundary mirrors."""
 
-    tag = "specular"
     place = 20
     costly = ("anisotropy",)
     weight: FractionMap = Field(1.0, description="factor on the reflectance of a dielectric, straight on")

@@ -9,7 +9,6 @@ from clfractal.schema.material import DepthMap, ForwardMap, Part
 class Subsurface(Part):
     """A medium below the boundary, in the place of the diffuse body: skin, wax, marble."""
 
-    tag = "subsurface"
     place = 60
     weight: FractionMap = Field(0.0, description="part of the diffuse body that light goes into")
     color: ReflectanceMap = Field(

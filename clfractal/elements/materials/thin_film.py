@@ -15,7 +15,6 @@ ThicknessMap = Annotated[Annotated[Thickness, Tag("given")] | Annotated[NumberMa
 class ThinFilm(Part):
     """A film on the boundary of the body, under the coat, whose colours are those of interference: soap, oil, oxides."""
 
-    tag = "thin_film"
     place = 25
     costly = ("weight",)
     weight: FractionMap = Field(0.0, description="part of the surface that has it")

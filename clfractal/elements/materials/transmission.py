@@ -15,7 +15,6 @@ AbbeMap = Annotated[Annotated[Abbe, Tag("given")] | Annotated[NumberMap, Tag("ma
 class Transmission(Part):
     """Glass in the place of the diffuse body; its roughness is that of `specular`."""
 
-    tag = "transmission"
     place = 50
     weight: FractionMap = Field(0.0, description="part of the body that is glass")
     color: ReflectanceMap = Field(

@@ -13,7 +13,6 @@ from clfractal.schema.shape import Sides, Solid
 class BoxObject(Solid):
     """A box."""
 
-    title = "Box"
     place = 40
     type: Literal["box"] = "box"
     size: Annotated[Sides, SCALE] = Field((1.0, 1.0, 1.0), description="its sides, scene units")

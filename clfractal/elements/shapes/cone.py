@@ -13,7 +13,6 @@ from clfractal.schema.shape import Solid
 class ConeObject(Solid):
     """A cone with a tip, or with lids at both ends; its axis is z before it is rotated."""
 
-    title = "Cone"
     place = 55
     type: Literal["cone"] = "cone"
     radius: Annotated[Length, SCALE] = Field(0.4, description="of its lower lid, scene units")

@@ -12,7 +12,6 @@ from clfractal.schema.shape import Solid
 class CylinderObject(Solid):
     """A cylinder with lids; its axis is z before it is rotated."""
 
-    title = "Cylinder"
     place = 50
     type: Literal["cylinder"] = "cylinder"
     radius: Annotated[Length, SCALE] = Field(0.25, description="scene units")

@@ -9,7 +9,6 @@ from clfractal.schema.shape import Level, Simple
 class PlaneObject(Simple, Level):
     """A plane without an end; as a part of the set, all below it."""
 
-    title = "Plane"
     place = 10
     type: Literal["plane"] = "plane"
 

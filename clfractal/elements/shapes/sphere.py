@@ -12,7 +12,6 @@ from clfractal.schema.shape import Solid
 class SphereObject(Solid):
     """A ball, or with `scale` an ellipsoid."""
 
-    title = "Sphere"
     place = 30
     type: Literal["sphere"] = "sphere"
     radius: Annotated[Length, SCALE] = Field(0.5, description="scene units")

@@ -13,7 +13,6 @@ from clfractal.schema.shape import Solid
 class TorusObject(Solid):
     """A torus, as a ring or a tyre; it lies around the z axis before it is rotated."""
 
-    title = "Torus"
     place = 60
     spans = 2
     type: Literal["torus"] = "torus"

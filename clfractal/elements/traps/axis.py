@@ -8,7 +8,6 @@ from clfractal.schema.trap import TrapShape
 class AxisTrap(TrapShape):
     """A line without an end, through a point."""
 
-    tag = "axis"
     place = 20
     keys = ("center", "direction")
 

@@ -8,7 +8,6 @@ from clfractal.schema.trap import TrapShape
 class PlaneTrap(TrapShape):
     """A plane through a point."""
 
-    tag = "plane"
     place = 30
     keys = ("center", "direction")
 

@@ -8,7 +8,6 @@ from clfractal.schema.trap import TrapShape
 class PointTrap(TrapShape):
     """A point."""
 
-    tag = "point"
     place = 10
     keys = ("center",)
 

@@ -8,7 +8,6 @@ from clfractal.schema.trap import TrapShape
 class SphereTrap(TrapShape):
     """The surface of a ball around a point."""
 
-    tag = "sphere"
     place = 40
     keys = ("center", "radius")
 
