@@ -26,16 +26,16 @@ def list_formulas() -> str:
     lines = [f"{name:{column}}{_line(catalog.description(name).get('title', ''))}" for name in names]
     for path in dict.fromkeys(path.parent for path in own.values()):
         lines.append(f"\nin {path}:")
-        lines += [f"{name:{column}}{_title(name)}" for name, file in own.items() if file.parent == path]
+        lines += [f"{name:{column}}{_title(name)[1]}" for name, file in own.items() if file.parent == path]
     return "\n".join(lines)
 
 
-def _title(name: str) -> str:
-    """The title of a formula of one's own, or what is wrong with it."""
+def _title(name: str) -> tuple[str, str]:
+    """The title of a formula of one's own, or what is wrong with it, with the word for that."""
     try:
-        return _line(catalog.described(name, Path())[1].title)
+        return "title", _line(catalog.described(name, Path())[1].title)
     except ClfractalError as error:
-        return _line(error)
+        return "problem", _line(error)
 
 
 def facts_of_all() -> list[dict[str, Any]]:
@@ -51,12 +51,7 @@ def facts_of_all() -> list[dict[str, Any]]:
         for name in catalog.names()
     ]
     for name, path in own_files(Path()).items():
-        facts: dict[str, Any] = {"name": name, "title": None, "file": str(path)}
-        try:
-            facts["title"] = _line(catalog.described(name, Path())[1].title)
-        except ClfractalError as error:
-            facts["problem"] = _line(error)
-        found.append(facts)
+        found.append({"name": name, "title": None, "file": str(path), **dict([_title(name)])})
     return found
 
 

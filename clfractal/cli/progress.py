@@ -111,7 +111,7 @@ class Reporter:
                 self._next = now + BAR_EVERY_SECONDS
                 self._draw(state)
         elif self._lines.due(share):
-            self._shell.say(f"rendering: {share:4.0%}, {rate(state)}, {_left(state)}")
+            self._shell.say(f"rendering: {share:4.0%}, {shown_rate(state.rays_per_second)}, {_left(state)}")
 
     def close(self) -> None:
         """Removes the bar."""
@@ -123,7 +123,7 @@ class Reporter:
     def summary(self, state: Progress, seconds: float) -> str:
         """The text of the last line: the time and the speed."""
         return (
-            f"{seconds:.2f} s, {rate(state)}"
+            f"{seconds:.2f} s, {shown_rate(state.rays_per_second)}"
             if state.rays
             else f"{seconds:.2f} s, nothing was left to render"
         )
@@ -133,7 +133,13 @@ class Reporter:
             self._bar = _new_bar(self._shell, self._tiles)
             self._shell.stalled = self._stalled
         task = self._bar.task_ids[0]
-        self._bar.update(task, completed=state.tiles_done, rate=rate(state), left=_left(state), stalled="")
+        self._bar.update(
+            task,
+            completed=state.tiles_done,
+            rate=shown_rate(state.rays_per_second),
+            left=_left(state),
+            stalled="",
+        )
         self._bar.refresh()
 
     def _stalled(self, line: str) -> None:
@@ -141,11 +147,6 @@ class Reporter:
         if bar is not None:
             bar.update(bar.task_ids[0], stalled=line)
             bar.refresh()
-
-
-def rate(state: Progress) -> str:
-    """Camera rays per second in words."""
-    return shown_rate(state.rays_per_second)
 
 
 def shown_rate(rays: float) -> str:

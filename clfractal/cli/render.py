@@ -61,10 +61,10 @@ def render_files(order: Order, shell: Shell) -> None:
     start = time.perf_counter()
     region = _region(order.region)
     scene = ordered_scene(order)
-    outputs = checked_outputs(order, scene, region)
+    check_outputs(order, scene, region)
     tell_reference(order, scene, shell)
     with engine_of(order, shell) as engine:
-        _render(replace(order, outputs=outputs), shell, engine, scene, region, start)
+        _render(order, shell, engine, scene, region, start)
 
 
 def _render(
@@ -84,7 +84,6 @@ def _render(
     from clfractal.engine.run import run
     from clfractal.images.outputs import output_files
 
-    outputs = order.outputs
     with speaking_of(order.scene), naming_options():
         job = engine.prepare(scene, region=region, samples=order.samples, precision=order.precision)
     if job.remark:
@@ -101,7 +100,7 @@ def _render(
         finally:
             reporter.close()
         rendered = time.perf_counter()
-        save_job(job, unfinished.framebuffers, outputs, header)
+        save_job(job, unfinished.framebuffers, order.outputs, header)
         written = time.perf_counter()
         comfort = None
         if job.scene.stereo is not None:  # asked here, so that other scenes do not load what measures it
@@ -124,7 +123,7 @@ def _render(
         values["workers"] = shares
     if order.stats is not None:
         stats.write_statistics(order.stats, values)
-    files = [file for path in outputs for file in output_files(job.scene.stereo, path)]
+    files = [file for path in order.outputs for file in output_files(job.scene.stereo, path)]
     shell.say(f"{', '.join(map(str, files))}: {reporter.summary(state, written - start)}")
     for remark in remarks:
         if remark != job.remark:
@@ -210,10 +209,8 @@ def numbers_of(option: str, text: str, separator: str, count: int, form: str) ->
     raise SceneError(f"must be {form}; got {text[:60]!r}", Where(option))
 
 
-def checked_outputs(
-    order: Order, scene: Scene, region: tuple[int, int, int, int] | None = None
-) -> tuple[Path, ...]:
-    """The files to write, all of them checked before anything is rendered.
+def check_outputs(order: Order, scene: Scene, region: tuple[int, int, int, int] | None = None) -> None:
+    """Checks all files that will be written before anything is rendered.
 
     Raises:
         FileError: one cannot be written, or would replace a file that is read.
@@ -223,10 +220,9 @@ def checked_outputs(
     from clfractal.images.formats import check_output as check_picture
     from clfractal.images.outputs import output_files
 
-    outputs = order.outputs
-    if order.streamed in outputs and len(output_files(scene.stereo, order.streamed)) > 1:
+    if order.streamed in order.outputs and len(output_files(scene.stereo, order.streamed)) > 1:
         raise FileError("takes one file, but a pair is two; name a file", Where(OUTPUT))
-    files = [file for path in outputs for file in output_files(scene.stereo, path)]
+    files = [file for path in order.outputs for file in output_files(scene.stereo, path)]
     content = Content.of(scene, region)
     for file in files:
         check_picture(file, content)
@@ -234,4 +230,3 @@ def checked_outputs(
         check_output(order.stats, (order.stats.suffix.lower(),))
         files.append(order.stats)
     refuse_overwriting([*files, *possible_paths(scene, _beside(order))], scene.files)
-    return outputs

@@ -44,7 +44,8 @@ class Shell:
         self.quiet = False
         self._owns_process = owns_process
         # A stream that was closed by whoever started the program is None.
-        self._errors: TextIO = sys.stderr or open(os.devnull, "w")  # noqa: SIM115 (until the process ends)
+        self.errors: TextIO = sys.stderr or open(os.devnull, "w")  # noqa: SIM115 (until the process ends)
+        """Standard error, also for a progress bar."""
         if owns_process:
             for stream in (sys.stdout, sys.stderr):
                 if isinstance(stream, TextIOWrapper):
@@ -70,12 +71,7 @@ class Shell:
     @property
     def terminal(self) -> bool:
         """Whether standard error is a terminal."""
-        return self._errors.isatty()
-
-    @property
-    def errors(self) -> TextIO:
-        """Standard error, for a progress bar."""
-        return self._errors
+        return self.errors.isatty()
 
     def mute_drivers(self) -> None:
         """From now on drivers' output does not reach standard error, except with `--verbose`."""
@@ -85,7 +81,7 @@ class Shell:
             own = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1)
             self._noise = _noise_file()
             os.dup2(self._noise, 2)
-            self._errors = own
+            self.errors = own
 
     def tell_warnings(self) -> None:
         """From now on the package's own warnings are remarks; those of libraries go where drivers' output goes."""
@@ -108,15 +104,15 @@ class Shell:
         line = self._named(line)
         with self._writing, suppress(OSError, ValueError):
             if not self._interrupted:
-                self._errors.write(_CLEAR + line)
-                self._errors.flush()
+                self.errors.write(_CLEAR + line)
+                self.errors.flush()
                 self._status = True
 
     def clear_status(self) -> None:
         """Takes that line away."""
         if self._status:
             with self._writing, suppress(OSError, ValueError):
-                self._errors.write(_CLEAR)
+                self.errors.write(_CLEAR)
                 self._status = False
 
     def say(self, line: str) -> None:
@@ -256,8 +252,8 @@ class Shell:
         held = self._writing.acquire(timeout=0.1)
         try:
             with suppress(OSError, ValueError):  # closed by whoever started us
-                self._errors.write((_CLEAR if self._status else "") + line + "\n")
-                self._errors.flush()
+                self.errors.write((_CLEAR if self._status else "") + line + "\n")
+                self.errors.flush()
                 self._status = False
         finally:
             if held:

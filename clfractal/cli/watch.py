@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from clfractal.cli.order import Order, naming_options
 from clfractal.cli.pipes import INPUT, STREAM, refuse_stream
-from clfractal.cli.render import checked_outputs, ordered_scene, tell_reference
+from clfractal.cli.render import check_outputs, ordered_scene, tell_reference
 from clfractal.cli.shell import Shell
 from clfractal.errors import ClfractalError, FileError, SceneError, Stopped, Where, speaking_of
 from clfractal.files.atomic import check_output
@@ -97,14 +97,15 @@ def _read(order: Order, watched: Watched) -> Scene:
             f"{scene.stereo.mode} makes two pictures; watch shows one, use another mode",
             Where(order.scene, path="stereo.mode"),
         )
-    checked_outputs(order, scene)
+    check_outputs(order, scene)
     return scene
 
 
 def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shell: Shell) -> bool:
     """Renders a scene to all outputs, coarse at first; False if a file has changed in the meantime."""
     begun = time.perf_counter()
-    outputs, output = checked_outputs(order, scene), scene.output
+    output = scene.output
+    check_outputs(order, scene)
     try:
         with _ended_by_change(watched) as token, speaking_of(order.scene), naming_options():
             written = 0.0
@@ -113,7 +114,7 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
             ):
                 last = not framebuffer.stage
                 if last or time.perf_counter() - written >= _LEAST_APART:
-                    for path in outputs:
+                    for path in order.outputs:
                         framebuffer.save(
                             path, half=output.half_channels, bits=output.png_bits, quality=output.quality
                         )
@@ -123,7 +124,7 @@ def _rendered(order: Order, scene: Scene, engine: Engine, watched: Watched, shel
     except ClfractalError as error:
         shell.refuse(str(error))
         return True
-    names = ", ".join(map(str, outputs))
+    names = ", ".join(map(str, order.outputs))
     shell.say(f"{names}: {scene.image.width} x {scene.image.height}, {time.perf_counter() - begun:.2f} s")
     for remark in framebuffer.remarks:
         shell.say(f"{order.scene}: {remark}")

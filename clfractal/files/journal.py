@@ -53,7 +53,13 @@ _MOST_DEVICES = 250
 
 
 class Journal:
-    """An open journal; made by `create` or `resume`. One process at a time may have it open."""
+    """An open journal; made by `create` or `resume`. One process at a time may have it open.
+
+    Attributes:
+        done: for each tile whether it is there; not to be written to.
+        provenance: for each tile the number of the device that made it; not to be written to.
+        notes: what is noted of devices, by their numbers.
+    """
 
     def __init__(
         self, path: Path, descriptor: int, start: int, channels: tuple[str, ...], tile_count: int
@@ -66,9 +72,9 @@ class Journal:
         self._size = _RECORD.size + self._payload
         self._records = 0
         self._place = np.full(tile_count, -1, dtype=np.int64)  # record number of each tile
-        self._done = np.zeros(tile_count, dtype=np.bool_)
-        self._provenance = np.zeros(tile_count, dtype=np.uint8)
-        self._notes: dict[int, dict[str, Any]] = {}
+        self.done = np.zeros(tile_count, dtype=np.bool_)
+        self.provenance = np.zeros(tile_count, dtype=np.uint8)
+        self.notes: dict[int, dict[str, Any]] = {}
 
     @classmethod
     def create(
@@ -153,21 +159,6 @@ class Journal:
             raise
         return journal
 
-    @property
-    def done(self) -> npt.NDArray[np.bool_]:
-        """For each tile whether it is there; not to be written to."""
-        return self._done
-
-    @property
-    def provenance(self) -> npt.NDArray[np.uint8]:
-        """For each tile the number of the device that made it; not to be written to."""
-        return self._provenance
-
-    @property
-    def notes(self) -> Mapping[int, dict[str, Any]]:
-        """What is noted of devices, by their numbers."""
-        return self._notes
-
     def note(self, device: int, about: Mapping[str, Any]) -> None:
         """Notes which device made tiles (JSON values, cut where a record has no room for them).
 
@@ -179,7 +170,7 @@ class Journal:
         shown = {key: str(value)[: self._payload // 16] for key, value in about.items()}
         text = json.dumps({**shown, "number": device}, ensure_ascii=False).encode()
         self._write(_NOTE, text[: self._payload].ljust(self._payload, b"\0"))
-        self._notes[device] = shown
+        self.notes[device] = shown
 
     def append(self, tile_index: int, array: Floats, device: int = 0) -> None:
         """Stores a tile: float32 of shape (channels, rows, columns), at most `SIDE` rows and columns.
@@ -199,8 +190,8 @@ class Journal:
             stored = np.zeros((planes, SIDE, SIDE), dtype="<f4")
             stored[:, :rows, :columns] = array
         self._place[tile_index] = self._write(tile_index | device << _INDEX_BITS, stored.tobytes())
-        self._done[tile_index] = True
-        self._provenance[tile_index] = device
+        self.done[tile_index] = True
+        self.provenance[tile_index] = device
 
     def tile(self, tile_index: int) -> Floats:
         """A stored tile: float32 of shape (channels, `SIDE`, `SIDE`).
@@ -266,13 +257,13 @@ class Journal:
             device, index = divmod(found[0], 1 << _INDEX_BITS)
             if index < len(self._place):
                 self._place[index] = number
-                self._done[index] = True
-                self._provenance[index] = device
+                self.done[index] = True
+                self.provenance[index] = device
 
     def _read_note(self, payload: bytes) -> None:
         with suppress(ValueError, KeyError, TypeError):
             about = json.loads(payload.rstrip(b"\0"))
-            self._notes[int(about.pop("number"))] = about
+            self.notes[int(about.pop("number"))] = about
 
 
 def identity_of(path: Path) -> dict[str, Any] | None:

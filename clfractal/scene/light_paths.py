@@ -4,7 +4,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, Tag
 
-from clfractal.schema.base import Section, chosen_by
+from clfractal.schema.base import ChosenBy, Section
 from clfractal.schema.fields import Usual
 
 MAX_BOUNCES = 256
@@ -46,5 +46,5 @@ class PathLighting(Section):
 
 Lighting = Annotated[
     Annotated[DirectLighting, Tag("direct")] | Annotated[PathLighting, Tag("path")],
-    chosen_by("mode", "direct"),
+    ChosenBy("mode", "direct"),
 ]

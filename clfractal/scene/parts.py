@@ -14,11 +14,11 @@ from clfractal.files.tone_names import Tone
 from clfractal.scene.camera_base import CameraBase
 from clfractal.schema.base import (
     Amount,
+    ChosenBy,
     Color,
     Fraction,
     Reflectance,
     Section,
-    chosen_by,
     chosen_by_word,
     length,
     minus,
@@ -147,7 +147,7 @@ class OrthographicCamera(CameraBase):
 AnyCamera: TypeAlias = PerspectiveCamera | OrthographicCamera
 Camera = Annotated[
     Annotated[PerspectiveCamera, Tag("perspective")] | Annotated[OrthographicCamera, Tag("orthographic")],
-    chosen_by("projection", "perspective"),
+    ChosenBy("projection", "perspective"),
 ]
 
 

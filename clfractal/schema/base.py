@@ -173,7 +173,7 @@ def rule(check: Callable[[S], None]) -> Any:
     return model_validator(mode="after")(keep)
 
 
-class _ByKey:
+class ChosenBy:
     """For a union of sections: the word under a key chooses one of them, and without the key it is the default's."""
 
     def __init__(self, key: str, default: str) -> None:
@@ -197,11 +197,6 @@ class _ByKey:
         given = isinstance(value, Mapping)
         found = value.get(self.key, self.default) if given else getattr(value, self.key, self.default)
         return found if isinstance(found, str) else repr(found)
-
-
-def chosen_by(key: str, default: str) -> _ByKey:
-    """Chooses a class of a union by the word under `key`; without the key it is `default`."""
-    return _ByKey(key, default)
 
 
 def chosen_by_word(word: str, other: str) -> Discriminator:

@@ -11,7 +11,7 @@ from pydantic import GetCoreSchemaHandler, Tag
 from pydantic_core import CoreSchema
 from pydantic_core.core_schema import literal_schema
 
-from clfractal.schema.base import Section, chosen_by
+from clfractal.schema.base import ChosenBy, Section
 
 
 class Kind:
@@ -80,7 +80,7 @@ def in_order(kinds: Iterable[type[K]]) -> tuple[type[K], ...]:
 def one_of(kinds: Iterable[type[Element]], key: str, default: str) -> Any:
     """The type of a value that is one of several kinds: the word under a key says which; without it, `default`."""
     options: list[Any] = [Annotated[kind, Tag(kind.tag)] for kind in in_order(kinds)]
-    return Annotated[reduce(or_, options), chosen_by(key, default)]
+    return Annotated[reduce(or_, options), ChosenBy(key, default)]
 
 
 @cache
