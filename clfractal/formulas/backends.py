@@ -29,34 +29,32 @@ class NumpyBackend:
 
     def call(self, function: str, arguments: list[Any]) -> Any:
         """The function's value as an array."""
-        if function == "pow":
-            return self._pow(arguments[0], arguments[1])
-        if function in ("cpow_re", "cpow_im"):
-            return self._cpow(*arguments)[function == "cpow_im"]
         return _NUMPY_FUNCTIONS[function](*arguments)
 
-    def _pow(self, x: Any, n: Any) -> Any:
-        exponent = whole(n)
-        if exponent is not None and abs(exponent) <= MAX_EXPONENT:
-            power = power_by_squaring(x, abs(exponent), lambda a, b: a * b, np.ones_like(x))
-            return power if exponent >= 0 else 1.0 / power
-        power = np.power(np.asarray(x, dtype=float), n)
-        return np.where(np.isnan(power) & ~(np.isnan(x) | np.isnan(n)), 0.0, power)
 
-    def _cpow(self, x: Any, y: Any, n: float) -> tuple[Any, Any]:
-        x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
-        if n == 0:
-            return np.ones_like(x), np.zeros_like(x)
-        origin = (x == 0) & (y == 0)
-        exponent = whole(n)
-        if exponent is not None and abs(exponent) <= MAX_EXPONENT:
-            re, im = power_by_squaring((x, y), abs(exponent), complex_multiply, (1.0, 0.0))
-            if exponent < 0:
-                size = re * re + im * im
-                re, im = np.where(origin, 0.0, re / size), np.where(origin, 0.0, -im / size)
-            return re, im
-        radius, angle = np.where(origin, 0.0, np.hypot(x, y) ** n), n * np.arctan2(y, x)
-        return radius * np.cos(angle), radius * np.sin(angle)
+def _numpy_power(x: Any, n: Any) -> Any:
+    exponent = whole(n)
+    if exponent is not None and abs(exponent) <= MAX_EXPONENT:
+        power = power_by_squaring(x, abs(exponent), lambda a, b: a * b, np.ones_like(x))
+        return power if exponent >= 0 else 1.0 / power
+    power = np.power(np.asarray(x, dtype=float), n)
+    return np.where(np.isnan(power) & ~(np.isnan(x) | np.isnan(n)), 0.0, power)
+
+
+def _numpy_complex_power(x: Any, y: Any, n: float) -> tuple[Any, Any]:
+    x, y = np.broadcast_arrays(np.asarray(x, dtype=float), np.asarray(y, dtype=float))
+    if n == 0:
+        return np.ones_like(x), np.zeros_like(x)
+    origin = (x == 0) & (y == 0)
+    exponent = whole(n)
+    if exponent is not None and abs(exponent) <= MAX_EXPONENT:
+        re, im = power_by_squaring((x, y), abs(exponent), complex_multiply, (1.0, 0.0))
+        if exponent < 0:
+            size = re * re + im * im
+            re, im = np.where(origin, 0.0, re / size), np.where(origin, 0.0, -im / size)
+        return re, im
+    radius, angle = np.where(origin, 0.0, np.hypot(x, y) ** n), n * np.arctan2(y, x)
+    return radius * np.cos(angle), radius * np.sin(angle)
 
 
 _NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
@@ -64,6 +62,9 @@ _NUMPY_FUNCTIONS: Mapping[str, Callable[..., Any]] = {
     "sub": np.subtract,
     "mul": np.multiply,
     "div": np.divide,
+    "pow": _numpy_power,
+    "cpow_re": lambda x, y, n: _numpy_complex_power(x, y, n)[0],
+    "cpow_im": lambda x, y, n: _numpy_complex_power(x, y, n)[1],
     "neg": np.negative,
     "lt": np.less,
     "le": np.less_equal,
@@ -109,6 +110,9 @@ class MpmathBackend:
             "sub": lambda a, b: a - b,
             "mul": lambda a, b: a * b,
             "div": self._divide,
+            "pow": self._pow,
+            "cpow_re": lambda x, y, n: self._cpow(x, y, n)[0],
+            "cpow_im": lambda x, y, n: self._cpow(x, y, n)[1],
             "neg": lambda a: -a,
             "lt": lambda a, b: bool(a < b),
             "le": lambda a, b: bool(a <= b),
@@ -141,10 +145,6 @@ class MpmathBackend:
 
     def call(self, function: str, arguments: list[Any]) -> Any:
         """The function's value as an mpf."""
-        if function == "pow":
-            return self._pow(arguments[0], arguments[1])
-        if function in ("cpow_re", "cpow_im"):
-            return self._cpow(*arguments)[function == "cpow_im"]
         return self.functions[function](*arguments)
 
     def _divide(self, a: Any, b: Any) -> Any:

@@ -91,7 +91,7 @@ def escape(
     radius = chain.bailout if bailout is None else bailout
     backend = NumpyBackend()
     with np.errstate(all="ignore"):
-        state, point = _start(chain, points, backend)
+        state, point = start(chain, points, backend)
         count = np.zeros(len(points), dtype=np.int64)
         alive = _norm(state) <= radius
         for application in range(iterations):
@@ -154,7 +154,7 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     return result, gradient
 
 
-def _start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], list[Float]]:
+def start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], list[Float]]:
     """The state before the first application and the point as a state."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
     raw = space_to_state(chain, list(columns), backend)

@@ -193,9 +193,7 @@ def trap_distances(chain: Chain, points: Floats, iterations: int, trap: Trap) ->
     backend = reference.NumpyBackend()
     result = np.full(len(points), np.inf)
     with np.errstate(all="ignore"):
-        raw = reference.space_to_state(chain, list(np.array(points, float).T), backend)
-        place = [np.array(np.broadcast_to(part, result.shape), float) for part in raw]
-        state = [np.zeros_like(part) if chain.add == "point" else part.copy() for part in place]
+        state, place = reference.start(chain, points, backend)
         alive = np.arange(len(points))
         first = trap.away(np.stack(place[:3], axis=1))
         for application in range(iterations):
