@@ -119,7 +119,7 @@ def test_scenes_and_formulas(page: Path, desk: Path) -> None:
             assert clfractal.load_scene(text + "\n").version == 1
         else:
             (desk / "formula.yaml").write_text(text)
-            assert catalog.load_file(desk / "formula.yaml").map
+            assert catalog.load_chain(desk / "formula.yaml").links
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name)

@@ -64,22 +64,6 @@ def load(name: str) -> Formula:
     return formula_from_mapping(data, Where(f"{name}.yaml"), name=name)
 
 
-def load_file(path: str | Path, *, shown: str | None = None) -> Formula:
-    """A formula from a file.
-
-    Raises:
-        FormulaError: the file's content is wrong, with line and column; or it holds a chain.
-        FileError: it cannot be read.
-    """
-    data, document = _read(Path(path), shown or str(path))
-    if "chain" in data:
-        raise FormulaError("holds a chain of formulas, not a single one", Where(shown or str(path)))
-    try:
-        return formula_from_mapping(data, Where(), name=Path(path).stem)
-    except FormulaError as error:
-        raise document.locate(error) from None
-
-
 def load_chain(formula: str | Path | Mapping[str, Any], parameters: Mapping[str, Any] | None = None) -> Chain:
     """The chain of a name, of a file (a Path, or a text that ends in .yaml or .yml) or of a mapping.
 
@@ -356,15 +340,3 @@ def _read(path: Path, shown: str) -> tuple[Mapping[str, Any], Any]:
     if not isinstance(data, Mapping):
         raise FormulaError("must be a mapping, a formula's keys", Where(shown))
     return data, document
-
-
-__all__ = [
-    "description",
-    "is_chain",
-    "load",
-    "load_chain",
-    "load_file",
-    "names",
-    "resolve",
-    "safe_path",
-]
