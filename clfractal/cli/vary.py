@@ -32,7 +32,7 @@ from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
-from clfractal.scene.named_files import rename_textures
+from clfractal.scene.named_files import rename_files
 
 if TYPE_CHECKING:
     from clfractal.engine.engine import Engine
@@ -236,17 +236,8 @@ class _Moved:
     def _renamed(self, data: dict[str, Any]) -> None:
         layout = data.get("layout") or {}
         for part in (data, *layout.get("views", ())):
-            for name in ("environment", "renderer"):
-                section = part.get(name) or {}
-                if section.get("file") is not None:
-                    section["file"] = self._from_there(section["file"])
-            for light in part.get("lights") or ():
-                if light.get("file") is not None:
-                    light["file"] = self._from_there(light["file"])
-        rename_textures(data.get("materials") or {}, self._from_there)
-        for each in (data.get("objects") or {}).values():
-            if each.get("file") is not None:
-                each["file"] = self._from_there(each["file"])
+            for name in ("environment", "renderer", "lights", "materials", "objects"):
+                rename_files(part.get(name), self._from_there)
 
     def _from_there(self, file: str) -> str:
         whole = (self.base / file).resolve()

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 from clfractal.errors import FormulaError, Where, unknown_name
 from clfractal.formulas.definition import MAX_REPEAT, BoundFormula, Formula, inside
@@ -150,19 +149,15 @@ def _with_values(bound: BoundFormula) -> str:
     return f" with {shown}" if shown else ""
 
 
-@dataclass(frozen=True, slots=True)
-class _Step:
-    """One step of `_check_constants`: a value to look at, or (with no `function`) a constant `let` to remember."""
-
-    key: str
-    function: str | None
-    value: Callable[[Mapping[str, float]], Any]
+# One step of `_check_constants`: a key, a function whose last argument is to be looked at, or None for a constant `let`
+# that is to be remembered; and the value.
+_Step: TypeAlias = tuple[str, str | None, Callable[[Mapping[str, float]], Any]]
 
 
 @lru_cache(maxsize=256)
 def _steps(formula: Formula) -> tuple[_Step, ...]:
     """Divisors and exponents outside the branches of a `where` that parameters alone may decide, and what they use."""
-    found = []
+    found: list[_Step] = []
     constant = {parameter.name for parameter in formula.parameters}
     for key, node in (*formula.let, *zip(formula.variables, formula.map, strict=True)):
         guarded = {
@@ -172,9 +167,9 @@ def _steps(formula: Formula) -> tuple[_Step, ...]:
             if isinstance(part, Call) and id(part) not in guarded and part.function in _LAST:
                 last = part.arguments[-1]
                 if names_in(last) <= constant:
-                    found.append(_Step(key, part.function, as_function(last)))
+                    found.append((key, part.function, as_function(last)))
         if names_in(node) <= constant and key not in formula.variables:
-            found.append(_Step(key, None, as_function(node)))
+            found.append((key, None, as_function(node)))
             constant.add(key)
     return tuple(found)
 
@@ -186,17 +181,17 @@ _LAST = frozenset(("div", "mod", "pow", "cpow_re", "cpow_im"))
 def _check_constants(bound: BoundFormula, where: Where) -> None:
     """Refuses values that make a divisor zero or an exponent huge, outside the branches of a `where`."""
     constants: dict[str, float] = dict(bound.values)
-    for step in _steps(bound.formula):
+    for key, function, value_of in _steps(bound.formula):
         try:
-            value = finite(step.value(constants))
+            value = finite(value_of(constants))
         except (FormulaError, KeyError):
             continue  # no number, or it uses a `let` that is none
-        if step.function is None:
-            constants[step.key] = value
-        elif step.function in ("div", "mod"):
+        if function is None:
+            constants[key] = value
+        elif function in ("div", "mod"):
             if value == 0:
-                raise FormulaError(f"division by zero in {step.key!r}{_with_values(bound)}", where)
+                raise FormulaError(f"division by zero in {key!r}{_with_values(bound)}", where)
         elif abs(value) > MAX_EXPONENT:
             raise FormulaError(
-                f"an exponent in {step.key!r} must be at most {MAX_EXPONENT}{_with_values(bound)}", where
+                f"an exponent in {key!r} must be at most {MAX_EXPONENT}{_with_values(bound)}", where
             )

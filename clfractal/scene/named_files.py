@@ -31,19 +31,19 @@ def with_textures(materials: Mapping[str, PbrMaterial], names: Mapping[str, str]
     for name, material in materials.items():
         if any(each.texture in names for _, each in maps_of(material)):
             given = material.model_dump(exclude_unset=True)
-            rename_textures(given, lambda file: names.get(file, file))
+            rename_files(given, lambda file: names.get(file, file))
             result[name] = PbrMaterial.checked(given)
     return result
 
 
-def rename_textures(data: Any, new: Callable[[str], str]) -> None:
-    """Gives the files in plain data of materials other names."""
-    if not isinstance(data, dict):
-        return
-    if isinstance(data.get("texture"), str):
-        data["texture"] = new(data["texture"])
-    for each in data.values():
-        rename_textures(each, new)
+def rename_files(data: Any, new: Callable[[str], str]) -> None:
+    """Gives the files in plain data of a part of a scene other names, but those of formulas."""
+    if isinstance(data, list):
+        for each in data:
+            rename_files(each, new)
+    if isinstance(data, dict):
+        data.update({key: new(data[key]) for key in ("file", "texture") if isinstance(data.get(key), str)})
+        rename_files([each for key, each in data.items() if key != "formula"], new)
 
 
 def light_files(lights: Iterable[LightBase]) -> dict[Key, str]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, get_args, get_origin
+from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
@@ -132,10 +132,10 @@ def _place(root: Root, location: Sequence[str | int]) -> _Place:
 
 
 def _problem(details: ErrorDetails, root: Root) -> Problem | None:
-    special: Callable[[ErrorDetails, Root], Problem | None] | None = _SPECIAL.get(details["type"])
-    if special is not None:
-        return special(details, root)
     place = _place(root, details["loc"])
+    special: _Special | None = _SPECIAL.get(details["type"])
+    if special is not None:
+        return special(details, place, root)
     if details["type"] not in _ALLOWED:
         return Problem(tuple(place.path), details["msg"][:1].lower() + details["msg"][1:])
     allowed = _allowed(details)
@@ -150,7 +150,7 @@ def _allowed(details: ErrorDetails) -> str:
     return _ALLOWED[details["type"]].format(**context)
 
 
-def _own(details: ErrorDetails, root: Root) -> Problem:
+def _own(details: ErrorDetails, _: _Place, root: Root) -> Problem:
     location = details["loc"]
     key = None
     if location and location[-1] == "[key]":
@@ -160,22 +160,21 @@ def _own(details: ErrorDetails, root: Root) -> Problem:
     return Problem((*path, *context["at"]), context["message"], key)
 
 
-def _unknown_key(details: ErrorDetails, root: Root) -> Problem:
+def _unknown_key(details: ErrorDetails, _: _Place, root: Root) -> Problem:
     place = _place(root, details["loc"][:-1])
     key = str(details["loc"][-1])
     return Problem(tuple(place.path), unknown_name("key", key, place.keys()), key)
 
 
-def _missing(details: ErrorDetails, root: Root) -> Problem:
+def _missing(details: ErrorDetails, _: _Place, root: Root) -> Problem:
     place = _place(root, details["loc"][:-1])
     part = details["loc"][-1]
     if isinstance(part, int):
-        return _tuple(details, root, place)
+        return _tuple(details, place, root)
     return Problem(tuple(place.path), "is missing", late=True, shown=(*place.path, part))
 
 
-def _tuple(details: ErrorDetails, root: Root, place: _Place | None = None) -> Problem:
-    place = place or _place(root, details["loc"])
+def _tuple(details: ErrorDetails, place: _Place, _: Root) -> Problem:
     fixed = next((t for t in place.types if get_origin(t) is tuple and ... not in get_args(t)), None)
     entries = [option for item in get_args(fixed) for option in _options(item)]
     of = "lists" if any(get_origin(entry) is tuple for entry in entries) else "numbers"
@@ -185,10 +184,9 @@ def _tuple(details: ErrorDetails, root: Root, place: _Place | None = None) -> Pr
     return Problem(tuple(place.path), f"must be {what}, got {shown(details['input'])}")
 
 
-def _length(details: ErrorDetails, root: Root) -> Problem | None:
-    place = _place(root, details["loc"])
+def _length(details: ErrorDetails, place: _Place, root: Root) -> Problem | None:
     if any(get_origin(t) is tuple and ... not in get_args(t) for t in place.types):
-        return _tuple(details, root, place)
+        return _tuple(details, place, root)
     # The check does not count an entry that is itself wrong; that entry has its own error.
     if details["type"] == "too_short" and len(details["input"]) >= details["ctx"]["min_length"]:
         return None
@@ -198,9 +196,8 @@ def _length(details: ErrorDetails, root: Root) -> Problem | None:
     return Problem(tuple(place.path), f"{allowed}, got {len(details['input'])}")
 
 
-def _kind(details: ErrorDetails, root: Root) -> Problem:
+def _kind(details: ErrorDetails, place: _Place, _: Root) -> Problem:
     """The message for a word that should choose a class but is unknown."""
-    place = _place(root, details["loc"])
     key = "projection" if any("projection" in m.model_fields for m in place.models) else "type"
     given = details["input"].get(key)
     tags = [_tag(model) for model in place.models]
@@ -210,8 +207,7 @@ def _kind(details: ErrorDetails, root: Root) -> Problem:
     return Problem(path, unknown_name(key, given, tags))
 
 
-def _word(details: ErrorDetails, root: Root) -> Problem:
-    place = _place(root, details["loc"])
+def _word(details: ErrorDetails, place: _Place, _: Root) -> Problem:
     allowed = details["ctx"]["expected"].replace("'", "")
     if place.models:
         allowed += f", a colour, or a mapping with {' and '.join(place.keys())}"
@@ -228,17 +224,18 @@ def _nearest_word(given: Any, allowed: str) -> str:
     return f"; did you mean {guess!r}?" if guess else ""
 
 
-def _color(details: ErrorDetails, root: Root) -> Problem:
+def _color(details: ErrorDetails, place: _Place, _: Root) -> Problem:
     """The message for what is no colour. Without quotes a `#` begins a comment, and the value is nothing."""
     given = details["input"]
     quoted = "; a # needs quotes" if given is None else ""
     return Problem(
-        tuple(_place(root, details["loc"]).path),
+        tuple(place.path),
         f"must be a list of 3 numbers, or a colour as '#ff8800' or '#f80', got {shown(given)}{quoted}",
     )
 
 
-_SPECIAL: Mapping[str, Callable[[ErrorDetails, Root], Problem | None]] = {
+_Special: TypeAlias = Callable[[ErrorDetails, _Place, Root], Problem | None]
+_SPECIAL: Mapping[str, _Special] = {
     "clfractal": _own,
     "color": _color,
     "extra_forbidden": _unknown_key,
