@@ -143,12 +143,12 @@ def ordered_scene(order: Order) -> Scene:
         source = read_scene(Path(order.scene))
         values = sized(source, order.overrides, (width, height))
         given |= {key: ("--size", value) for key, value in values.items()}
-    if order.samples is not None:
-        given["renderer.samples"] = ("--samples", str(order.samples))
-    if order.precision is not None:
-        given["renderer.precision"] = ("--precision", json.dumps(order.precision))
-    if order.denoise:
-        given["output.denoise"] = ("--denoise", "true")
+    options = (
+        ("renderer.samples", "--samples", order.samples),
+        ("renderer.precision", "--precision", order.precision),
+        ("output.denoise", "--denoise", order.denoise or None),
+    )
+    given |= {key: (option, json.dumps(value)) for key, option, value in options if value is not None}
     overrides = [*order.overrides, *(f"{key}={value}" for key, (_, value) in given.items())]
     try:
         scene = load_scene(source, overrides=overrides, folder=order.folder)

@@ -16,8 +16,6 @@ MAX_BYTES = 1_000_000
 def check_regular(descriptor: int, name: str, limit: int | None) -> None:
     """Refuses what is no regular file (a device could be read for ever), and a file above `limit` bytes."""
     status = os.fstat(descriptor)
-    if stat.S_ISDIR(status.st_mode):
-        raise FileError("is a folder, not a file", Where(name))
     if not stat.S_ISREG(status.st_mode):
         raise FileError("is not a regular file", Where(name))
     if limit is not None and status.st_size > limit:
@@ -35,21 +33,17 @@ def read_bytes(
     shown = name or str(path)
     note(path)
     try:
-        descriptor = os.open(path, system.READ)
+        with open(path, "rb", opener=lambda name, _flags: os.open(name, system.READ)) as stream:
+            check_regular(stream.fileno(), shown, None if prefix is not None else limit)
+            content = stream.read(prefix if prefix is not None else limit + 1)
+    except IsADirectoryError as error:
+        raise FileError("is a folder, not a file", Where(shown)) from error
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) and error.strerror else str(error)
         # `clfractal new pollen` writes pollen.yaml: its user may leave the ending away here, too.
         ended = isinstance(error, FileNotFoundError) and path.with_name(f"{path.name}.yaml").is_file()
         hint = f"; did you mean {shown}.yaml?" if ended else ""
         raise FileError(f"cannot be read: {reason}{hint}", Where(shown)) from error
-    try:
-        check_regular(descriptor, shown, None if prefix is not None else limit)
-        with os.fdopen(descriptor, "rb", closefd=False) as stream:
-            content = stream.read(prefix if prefix is not None else limit + 1)
-    except OSError as error:
-        raise FileError(f"cannot be read: {error.strerror}", Where(shown)) from error
-    finally:
-        os.close(descriptor)
     if prefix is None and len(content) > limit:
         raise FileError(f"is too large: at most {limit:,} bytes", Where(shown))
     return content

@@ -62,8 +62,6 @@ class _Builder:
         self.data = data
         self.where = where
         self.name = name
-        self.variables: tuple[str, ...] = ()
-        self.parameters: tuple[Parameter, ...] = ()
 
     def build(self) -> Formula:
         check_keys(self.data, _KEYS, self.where)
