@@ -9,11 +9,10 @@ compute, an application is written twice: for the usual values, which are litera
 from __future__ import annotations
 
 import re
-from collections import OrderedDict
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
-from threading import Lock
+from sys import intern
 from typing import Any, Literal
 
 from clfractal.formulas.costs import cost_of
@@ -69,23 +68,22 @@ def write_formula(
     Writing takes milliseconds, so texts are kept: for other parameter values only the constants are computed.
     """
     structure = tuple(link.structure for link in chain.links)
-    key = (structure, scalar_rule, dual_map, leaf, chain.degree > 1, _starts_at_zero(chain))
-    with _LOCK:
-        written = _WRITTEN.get(key)
-    if written is None:
-        written = _ChainWriter(chain, scalar_rule, dual_map, leaf).write()
-        with _LOCK:
-            _WRITTEN[key] = written
-            if len(_WRITTEN) > _MOST_TEXTS:
-                _WRITTEN.popitem(last=False)
-    return written.filled(chain)
+    asked = _Asked((structure, chain.degree > 1, _starts_at_zero(chain)), chain)
+    return _written(asked, scalar_rule, dual_map, leaf).filled(chain)
 
 
 def forget_texts() -> None:
     """Forgets all kept texts."""
     write_formula.cache_clear()
-    with _LOCK:
-        _WRITTEN.clear()
+    _written.cache_clear()
+
+
+@dataclass(frozen=True, slots=True)
+class _Asked:
+    """A chain whose text is asked for: chains of one structure, whatever their parameters' values are, are one question."""
+
+    structure: tuple[object, ...]
+    chain: Chain = field(compare=False)
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,16 +113,9 @@ class _Written:
         return FormulaText(self.text, tuple(constants) or (0.0,), self.facts)
 
 
-# The texts of the formulas that were used last.
-_WRITTEN: OrderedDict[tuple[object, ...], _Written] = OrderedDict()
-_MOST_TEXTS = 64
-_LOCK = Lock()
-
-
-@lru_cache(maxsize=512)
-def _one(text: str) -> str:
-    """One object for equal texts, so that comparing them takes no time."""
-    return text
+@lru_cache(maxsize=64)
+def _written(asked: _Asked, scalar_rule: bool, dual_map: DualMap, leaf: Leaf | None) -> _Written:
+    return _ChainWriter(asked.chain, scalar_rule, dual_map, leaf).write()
 
 
 def _starts_at_zero(chain: Chain) -> bool:
@@ -204,7 +195,8 @@ class _ChainWriter:
         )
         head = [facts.defines() + each_usual(1), state_functions(self.width)] if self.leaf is None else []
         return _Written(
-            _one("\n".join([*head, *parts]) + "\n"),
+            # One object for equal texts, so that comparing them takes no time.
+            intern("\n".join([*head, *parts]) + "\n"),
             facts,
             tuple(
                 (owner, as_function(node) if node is not None else None, slot in self.constants.strict)
