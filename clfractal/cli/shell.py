@@ -207,7 +207,8 @@ class Shell:
         elif isinstance(error, MemoryError):
             line, status = "clfractal: out of memory", STATUS_BAD_INPUT
         elif isinstance(error, OSError) and error.strerror:
-            line, status = _system_line(error), STATUS_BAD_INPUT
+            file = error.filename if isinstance(error.filename, str) else "clfractal"
+            line, status = f"{file}: {error.strerror}", STATUS_BAD_INPUT
         else:
             summary = " ".join(f"{type(error).__name__}: {error}".split())[:300]
             line = f"clfractal: internal error, please report it: {summary}"
@@ -269,8 +270,3 @@ def _noise_file() -> int:
 
     with tempfile.TemporaryFile() as file:
         return os.dup(file.fileno())
-
-
-def _system_line(error: OSError) -> str:
-    where = f"{error.filename}: " if isinstance(error.filename, str) else "clfractal: "
-    return f"{where}{error.strerror}"

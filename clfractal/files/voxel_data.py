@@ -139,7 +139,8 @@ def _unpacked(stream: BinaryIO, head: Header, offset: int, limit: int | None) ->
     values = room(head.dtype.newbyteorder("="), head.shape, limit)
     stream.seek(offset)
     try:
-        with _unpacking(stream, head) as unpacked:
+        opened = gzip.GzipFile(fileobj=stream) if head.encoding == "gzip" else bz2.BZ2File(stream)
+        with cast(IO[bytes], opened) as unpacked:
             left = head.byte_skip
             while left and (skipped := len(unpacked.read(min(left, _PIECE)))):
                 left -= skipped
@@ -152,12 +153,6 @@ def _unpacked(stream: BinaryIO, head: Header, offset: int, limit: int | None) ->
             raise  # not the data's fault
         raise ContentError("is damaged: its compressed data are wrong") from error
     return _native(values, head.dtype)
-
-
-def _unpacking(stream: BinaryIO, head: Header) -> IO[bytes]:
-    if head.encoding == "gzip":
-        return cast(IO[bytes], gzip.GzipFile(fileobj=stream))
-    return cast(IO[bytes], bz2.BZ2File(stream))
 
 
 def _into(unpacked: IO[bytes], wanted: memoryview) -> int:

@@ -201,7 +201,10 @@ class DualBackend:
             "sub": lambda v, value: (1.0, -1.0),
             "mul": lambda v, value: (v[1], v[0]),
             "div": lambda v, value: (do("div", 1.0, v[1]), do("neg", do("div", value, v[1]))),
-            "pow": lambda v, value: self._power_slopes(v[0], v[1], value),
+            "pow": lambda v, value: (
+                self._finite(do("mul", v[1], do("pow", v[0], do("sub", v[1], 1.0)))),
+                self._finite(do("mul", value, do("log", v[0]))),
+            ),
             "neg": lambda v, value: (-1.0,),
             "abs": lambda v, value: (do("sign", v[0]),),
             "sqrt": lambda v, value: (guarded(do("gt", v[0], 0.0), lambda: do("div", 0.5, value)),),
@@ -284,10 +287,6 @@ class DualBackend:
         square = self._base("mul", self._base("sub", 1.0, x), self._base("add", 1.0, x))
         root = self._base("sqrt", square)
         return (self._guarded(self._base("gt", square, 0.0), lambda: self._base("div", sign, root)),)
-
-    def _power_slopes(self, x: Any, y: Any, value: Any) -> tuple[Any, Any]:
-        by_base = self._finite(self._base("mul", y, self._base("pow", x, self._base("sub", y, 1.0))))
-        return by_base, self._finite(self._base("mul", value, self._base("log", x)))
 
     def _finite(self, slope: Any) -> Any:
         return self._guarded(self._base("le", self._base("abs", slope), 1e300), lambda: slope)

@@ -1,7 +1,8 @@
 """Checks that concern several parts of a scene, made once the formula and its bounds are known."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from math import dist
+from operator import and_, gt, or_
 from typing import TYPE_CHECKING
 
 from clfractal.elements.lights.set import SetLight
@@ -307,6 +308,10 @@ def _check_lights(scene: Scene) -> None:
             raise inside_of("the object", index, position)
 
 
+# Whether a point is in what is joined, by whether it is in the first and in the second; of others, in one of them.
+_JOINED: Mapping[str, Callable[[bool, bool], bool]] = {"cut": gt, "intersection": and_}
+
+
 def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:
     """Which points belong to the solid that is drawn; after `most` applications without escape they count as inside."""
     found = _inside_formula(scene.chain, min(scene.formula.iterations, most), points)
@@ -317,12 +322,7 @@ def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_AP
         else:
             assert isinstance(each, Simple)
             more = [each.holds(point) for point in points]
-        if each.join == "cut":
-            found = [a and not b for a, b in zip(found, more, strict=True)]
-        elif each.join == "intersection":
-            found = [a and b for a, b in zip(found, more, strict=True)]
-        else:
-            found = [a or b for a, b in zip(found, more, strict=True)]
+        found = [_JOINED.get(each.join, or_)(a, b) for a, b in zip(found, more, strict=True)]
     return found
 
 

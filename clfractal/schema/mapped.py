@@ -5,6 +5,7 @@ from typing import Annotated, Any, ClassVar, get_args
 
 from pydantic import Discriminator, Field, Tag
 from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
 
 from clfractal.schema.base import (
     Amount,
@@ -175,15 +176,9 @@ class Mapped(Section):
             if isinstance(found, Map):
                 try:
                     found.check(*_limits(field.annotation))
-                except Exception as error:
-                    raise _inside(error, name) from None
-
-
-def _inside(error: Exception, name: str) -> Exception:
-    context = getattr(error, "context", None)
-    if context is None:
-        return error
-    return problem(context["message"], (name, *context["at"]))
+                except PydanticCustomError as error:
+                    told: Any = error.context
+                    raise problem(told["message"], (name, *told["at"])) from None
 
 
 def _limits(annotation: Any) -> tuple[float, float]:
