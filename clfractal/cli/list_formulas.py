@@ -46,13 +46,16 @@ def facts_of_all() -> list[dict[str, Any]]:
     Raises:
         FileError: a folder of CLFRACTAL_FORMULAS is not there.
     """
-    found: list[dict[str, Any]] = [
-        {"name": name, "title": _line(catalog.description(name).get("title", "")), "file": None}
-        for name in catalog.names()
+    return [
+        *(
+            {"name": name, "title": _line(catalog.description(name).get("title", "")), "file": None}
+            for name in catalog.names()
+        ),
+        *(
+            {"name": name, "title": None, "file": str(path), **dict([_title(name)])}
+            for name, path in own_files(Path()).items()
+        ),
     ]
-    for name, path in own_files(Path()).items():
-        found.append({"name": name, "title": None, "file": str(path), **dict([_title(name)])})
-    return found
 
 
 def facts_of(name: str) -> dict[str, Any]:

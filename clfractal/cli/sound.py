@@ -70,9 +70,11 @@ def write_loudness(order: SoundOrder, shell: Shell) -> None:
 
 
 def _write(order: SoundOrder, titles: list[str], values: npt.NDArray[np.float64]) -> None:
-    lines = [",".join(["frame", "time", *titles])]
-    for frame, row in enumerate(values):
-        lines.append(",".join([str(frame), f"{frame / order.fps:.6g}", *(f"{value:.6g}" for value in row)]))
+    rows = (
+        [str(frame), f"{frame / order.fps:.6g}", *(f"{value:.6g}" for value in row)]
+        for frame, row in enumerate(values)
+    )
+    lines = map(",".join, (["frame", "time", *titles], *rows))
     with atomic_writer(order.output) as path:
         path.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

@@ -45,7 +45,7 @@ def _target(path: str | Path) -> Path:
     return Path(os.path.realpath(path))
 
 
-def _open_beside(target: Path) -> tuple[int, Path]:
+def open_beside(target: Path) -> tuple[int, Path]:
     """A new hidden file in the folder of `target`, with the permissions that a plain new file would have."""
     # A name may already have the greatest length that the file system allows, so only its beginning is used.
     beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
@@ -86,7 +86,7 @@ def check_output(path: str | Path, extensions: tuple[str, ...] = PICTURES) -> No
             if not os.access(target, os.W_OK):
                 raise file_error(path, "cannot be written: it is write-protected", "")
         # Access rights, read-only file systems, quotas: only an attempt to write tests all of them.
-        descriptor, beside = _open_beside(target)
+        descriptor, beside = open_beside(target)
         os.close(descriptor)
         beside.unlink()
 
@@ -102,7 +102,7 @@ def atomic_writer(path: str | Path) -> Iterator[Path]:
     """
     with naming(path, "cannot be written"):
         target = _target(path)
-        descriptor, beside = _open_beside(target)
+        descriptor, beside = open_beside(target)
     try:
         yield beside
         os.fsync(descriptor)

@@ -150,8 +150,8 @@ def _to_xyz(chromaticities: tuple[float, ...]) -> Doubles:
 
 def _adaptation(chromaticities: tuple[float, ...]) -> Doubles:
     """From a file's white to that of Rec. 709, by the Bradford transform (ICC.1:2010, annex E)."""
-    whites = []
-    for x, y in (chromaticities[6:], _REC709[6:]):
-        whites.append(_BRADFORD @ np.array([x / y, 1.0, (1 - x - y) / y]))
+    whites = [
+        _BRADFORD @ np.array([x / y, 1.0, (1 - x - y) / y]) for x, y in (chromaticities[6:], _REC709[6:])
+    ]
     matrix: Doubles = np.linalg.solve(_BRADFORD, np.diag(whites[1] / whites[0]) @ _BRADFORD)
     return matrix

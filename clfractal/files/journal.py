@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import json
 import os
-import secrets
 import stat
 import struct
 import zlib
@@ -36,7 +35,7 @@ import numpy.typing as npt
 
 from clfractal.errors import FileError, Where
 from clfractal.files import system
-from clfractal.files.atomic import file_error, naming
+from clfractal.files.atomic import file_error, naming, open_beside
 
 Floats = npt.NDArray[np.float32]
 
@@ -99,9 +98,8 @@ class Journal:
         if tile_count >= 1 << _INDEX_BITS:
             raise ValueError(f"{tile_count} tiles in one journal")
         text = _identity_text(identity, channels, tile_count)
-        beside = target.with_name(f".{target.stem[:40]}.{secrets.token_hex(6)}.tmp")
         with naming(target, "cannot be written"):
-            descriptor = os.open(beside, system.CREATE, 0o666)
+            descriptor, beside = open_beside(target)
         try:
             with suppress(OSError):  # a file system without locks
                 system.lock(descriptor)

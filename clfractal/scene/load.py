@@ -280,22 +280,26 @@ def _check_views(scene: Scene) -> None:
 
 def _check_palettes(scene: Scene) -> None:
     """Raises SceneError if a palette that is used does not exist."""
-    used: list[tuple[str, Any]] = []
-    if scene.coloring.uses_palette:
-        used.append(("coloring.palette", scene.coloring.palette))
-    if isinstance(scene.renderer, CutPlaneRenderer):
-        used.append(("renderer.colors.palette", scene.renderer.colors.palette))
-    for index, plane in enumerate(scene.cut_planes):
-        used.append((f"cut_planes.{index}.colors.palette", plane.colors.palette))
-    for name, material in scene.materials.items():
-        used += [
+    flat = scene.renderer if isinstance(scene.renderer, CutPlaneRenderer) else None
+    used: list[tuple[str, Any]] = [
+        *([("coloring.palette", scene.coloring.palette)] if scene.coloring.uses_palette else []),
+        *([("renderer.colors.palette", flat.colors.palette)] if flat is not None else []),
+        *(
+            (f"cut_planes.{index}.colors.palette", p.colors.palette)
+            for index, p in enumerate(scene.cut_planes)
+        ),
+        *(
             (f"materials.{name}.{key}.palette", each.palette)
+            for name, material in scene.materials.items()
             for key, each in maps_of(material)
             if isinstance(each, ColorMap)
-        ]
-    for index, light in enumerate(scene.lights):
-        if isinstance(light, SetLight) and light.palette is not None:
-            used.append((f"lights.{index}.palette", light.palette))
+        ),
+        *(
+            (f"lights.{index}.palette", light.palette)
+            for index, light in enumerate(scene.lights)
+            if isinstance(light, SetLight) and light.palette is not None
+        ),
+    ]
     if used:
         from clfractal.scene.palette import check_palette
 

@@ -179,11 +179,13 @@ def movement_of(scene: Scene) -> Movement:
 
 def _seeds(scene: Scene, frame: int) -> dict[tuple[str, ...], int]:
     """The seed of each renderer of a scene in a frame, by path."""
-    renderers: dict[tuple[str, ...], Renderer] = {("renderer",): scene.renderer}
-    for number, view in enumerate(scene.layout.views if scene.layout is not None else ()):
-        if view.renderer is not None:
-            renderers["layout", "views", str(number), "renderer"] = view.renderer
-    return {(*path, "seed"): (renderer.seed + frame) % 2**32 for path, renderer in renderers.items()}
+    views = scene.layout.views if scene.layout is not None else ()
+    renderers: dict[tuple[str, ...], Renderer | None] = {("renderer",): scene.renderer} | {
+        ("layout", "views", str(number), "renderer"): view.renderer for number, view in enumerate(views)
+    }
+    return {
+        (*path, "seed"): (renderer.seed + frame) % 2**32 for path, renderer in renderers.items() if renderer
+    }
 
 
 def _placed(name: str, make: Callable[..., Any], *arguments: Any) -> Any:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.objects import VolumeObject
@@ -11,18 +11,27 @@ from clfractal.schema.light import LightBase
 from clfractal.schema.mapped import maps_of
 from clfractal.schema.shape import ObjectBase
 
+T = TypeVar("T")
 Key: TypeAlias = tuple[str, str]
 """The word of a kind of lights, and the name of a file that lights of this kind read."""
 
 
+def _first(named: Iterable[tuple[T, str]]) -> dict[T, str]:
+    """Of each thing that is named the first path."""
+    found: dict[T, str] = {}
+    for each, path in named:
+        found.setdefault(each, path)
+    return found
+
+
 def texture_files(materials: Mapping[str, PbrMaterial]) -> dict[str, str]:
     """The files that materials name, and of each the path of the key that names it first."""
-    found: dict[str, str] = {}
-    for name, material in materials.items():
-        for key, each in maps_of(material):
-            if each.texture is not None:
-                found.setdefault(each.texture, f"materials.{name}.{key}.texture")
-    return found
+    return _first(
+        (each.texture, f"materials.{name}.{key}.texture")
+        for name, material in materials.items()
+        for key, each in maps_of(material)
+        if each.texture is not None
+    )
 
 
 def with_textures(materials: Mapping[str, PbrMaterial], names: Mapping[str, str]) -> dict[str, PbrMaterial]:
@@ -48,11 +57,11 @@ def rename_files(data: Any, new: Callable[[str], str]) -> None:
 
 def light_files(lights: Iterable[LightBase]) -> dict[Key, str]:
     """The files that lights read, and of each the path of the key that names it first."""
-    found: dict[Key, str] = {}
-    for number, light in enumerate(lights):
-        if light.reads is not None:
-            found.setdefault((light.tag, light.reads), f"lights.{number}.file")
-    return found
+    return _first(
+        ((light.tag, light.reads), f"lights.{number}.file")
+        for number, light in enumerate(lights)
+        if light.reads is not None
+    )
 
 
 def with_light_files(lights: tuple[LightBase, ...], names: Mapping[str, str]) -> tuple[LightBase, ...]:
@@ -72,10 +81,7 @@ def volumes_of(objects: Mapping[str, ObjectBase]) -> dict[str, VolumeObject]:
 
 def grid_files(objects: Mapping[str, ObjectBase]) -> dict[str, str]:
     """The files that volumes name, and of each the path of the key that names it first."""
-    found: dict[str, str] = {}
-    for name, each in volumes_of(objects).items():
-        found.setdefault(each.file, f"objects.{name}.file")
-    return found
+    return _first((each.file, f"objects.{name}.file") for name, each in volumes_of(objects).items())
 
 
 def with_grids(objects: Mapping[str, ObjectBase], names: Mapping[str, str]) -> dict[str, ObjectBase]:

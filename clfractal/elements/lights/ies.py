@@ -1,7 +1,7 @@
 """A luminaire as it was measured, from a file of the IES's format LM-63 (1986 to 2002)."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from math import isfinite
 from pathlib import Path
 from typing import Annotated, Literal, NoReturn
@@ -168,13 +168,12 @@ class _Numbers:
 
     def __init__(self, path: Path, lines: Sequence[str], begin: int) -> None:
         self._path, self._line, self._last = path, begin, len(lines)
-        self._tokens = self._split(lines[begin:], begin + 1)
-
-    def _split(self, lines: Sequence[str], first: int) -> Iterator[tuple[str, int]]:
-        for number, line in enumerate(lines, first):
-            for text in re.split(r"[\s,]+", line):
-                if text:
-                    yield text, number
+        self._tokens = (
+            (text, number)
+            for number, line in enumerate(lines[begin:], begin + 1)
+            for text in re.split(r"[\s,]+", line)
+            if text
+        )
 
     def refuse(self, message: str) -> NoReturn:
         """Raises FileError at the line of the last number."""
