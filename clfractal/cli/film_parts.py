@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from pathlib import Path
 
 from clfractal.errors import FileError, SceneError, Where
@@ -75,12 +76,10 @@ def missing(numbers: Iterable[int], files: Iterable[Sequence[Path]]) -> list[int
 
 def ranges(numbers: Sequence[int]) -> Iterator[str]:
     """Numbers in order, as `--frames` takes them: `3`, `5-9`."""
-    begin = 0
-    for place in range(1, len(numbers) + 1):
-        if place == len(numbers) or numbers[place] != numbers[place - 1] + 1:
-            first, last = numbers[begin], numbers[place - 1]
-            yield str(first) if first == last else f"{first}-{last}"
-            begin = place
+    # (In a row, numbers and their places rise together.)
+    for _, row in groupby(enumerate(numbers), lambda each: each[1] - each[0]):
+        run = [number for _, number in row]
+        yield str(run[0]) if len(run) == 1 else f"{run[0]}-{run[-1]}"
 
 
 def shown_ranges(numbers: Sequence[int]) -> str:

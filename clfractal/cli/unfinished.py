@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import glob
+import re
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -145,11 +146,5 @@ def _of_views(output: Path) -> list[Path]:
     return [
         path
         for path in output.parent.glob(f"{glob.escape(output.name)}.*{PARTIAL}")
-        if _names_a_view(path.name[len(output.name) : -len(PARTIAL)])
+        if re.fullmatch(r"(\.right|\.view\d+)*", path.name[len(output.name) : -len(PARTIAL)])
     ]
-
-
-def _names_a_view(words: str) -> bool:
-    return all(
-        word == "right" or (word[:4] == "view" and word[4:].isdecimal()) for word in words.split(".")[1:]
-    )

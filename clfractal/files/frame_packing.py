@@ -6,6 +6,7 @@ ITU-T H.264 (08/2021), D.1.26, and ITU-T H.265 (08/2021), D.2.16, and put before
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 TYPES: Mapping[str, int] = {
@@ -94,12 +95,4 @@ def _closed(bits: str) -> bytes:
 
 def _guarded(data: bytes) -> bytes:
     """The bytes of a NAL unit, in which nothing looks like a start code (H.264, 7.4.1.1)."""
-    found = bytearray()
-    zeros = 0
-    for byte in data:
-        if zeros >= 2 and byte <= 3:
-            found.append(3)
-            zeros = 0
-        found.append(byte)
-        zeros = zeros + 1 if byte == 0 else 0
-    return bytes(found)
+    return re.sub(rb"\0\0(?=[\0-\3])", b"\0\0\3", data)

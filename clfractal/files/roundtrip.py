@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import difflib
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import takewhile
 from typing import Any
 
 from clfractal.errors import SceneError
@@ -57,12 +58,8 @@ def updated(
 
 def written(data: Mapping[str, Any], head: str = "") -> str:
     """A mapping as YAML text, below the comments that the text `head` begins with."""
-    lines = []
-    for line in head.splitlines():
-        if line.strip() and not line.startswith("#"):
-            break
-        lines.append(line)
-    return "\n".join([*lines, *block_lines(data, 0)]) + "\n"
+    comments = takewhile(lambda line: not line.strip() or line.startswith("#"), head.splitlines())
+    return "\n".join([*comments, *block_lines(data, 0)]) + "\n"
 
 
 def _stands_for(found: Any, original: Any, before: Any, after: Any, sparse: Any) -> bool:

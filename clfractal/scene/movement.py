@@ -184,7 +184,9 @@ def _seeds(scene: Scene, frame: int) -> dict[tuple[str, ...], int]:
         ("layout", "views", str(number), "renderer"): view.renderer for number, view in enumerate(views)
     }
     return {
-        (*path, "seed"): (renderer.seed + frame) % 2**32 for path, renderer in renderers.items() if renderer
+        (*path, "seed"): (renderer.seed + frame) % 2**32
+        for path, renderer in renderers.items()
+        if renderer is not None
     }
 
 
