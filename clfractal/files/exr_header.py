@@ -213,8 +213,7 @@ def _check_whole(stream: BinaryIO, header: ExrHeader) -> None:
         raise cut_short
     stream.seek(header.end)
     offsets = np.frombuffer(_exactly(stream, 8 * count), "<u8")
-    if offsets.min() == 0:  # how the library leaves the table of a file that was never finished
-        raise cut_short
+    # (Of a file that was never finished the library leaves zeros in the table.)
     if offsets.min() < table_end or offsets.max() + np.uint64(8) > header.file_size:
         raise cut_short
     last = int(offsets.max())

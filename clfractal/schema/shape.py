@@ -2,6 +2,7 @@
 
 import math
 from abc import abstractmethod
+from functools import reduce
 from typing import Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
@@ -21,12 +22,9 @@ Sides = Annotated[tuple[Length, Length, Length], Field(strict=False)]
 
 def turned_axes(rotation: Vector) -> tuple[Vector, Vector, Vector]:
     """The three axes after turns about those of space, in degrees; each has length 1."""
-    found = []
-    for axis in AXES:
-        for about, degrees in zip(AXES, rotation, strict=True):
-            axis = turn(axis, about, degrees)
-        found.append(axis)
-    return found[0], found[1], found[2]
+    turns = list(zip(AXES, rotation, strict=True))
+    x, y, z = (reduce(lambda turned, each: turn(turned, *each), turns, axis) for axis in AXES)
+    return x, y, z
 
 
 class ObjectBase(Element):
@@ -106,11 +104,9 @@ class Solid(Simple):
     @property
     def axes(self) -> tuple[Vector, Vector, Vector]:
         """From its middle to the ends of its own three axes, scene units."""
-        found = []
-        for axis, half, factor in zip(turned_axes(self.rotation), self.half_sides, self.scale, strict=True):
-            x, y, z = axis
-            found.append((x * half * factor, y * half * factor, z * half * factor))
-        return found[0], found[1], found[2]
+        turned = zip(turned_axes(self.rotation), self.half_sides, self.scale, strict=True)
+        a, b, c = ((x * half * f, y * half * f, z * half * f) for (x, y, z), half, f in turned)
+        return a, b, c
 
     @property
     def ball(self) -> Ball:
