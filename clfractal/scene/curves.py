@@ -59,10 +59,6 @@ class Monotone:
         cubic = (start + end - 2 * rise) * share + 3 * rise - 2 * start - end
         return first + share * (start + share * cubic)
 
-    def at(self, time: float) -> Values:
-        """As a `Curve`."""
-        return (self.number(time),)
-
 
 def _slopes(times: Values, numbers: Values, closed: bool) -> Values:
     """The slope at each key (Steffen 1990, Eq. 11)."""
@@ -244,7 +240,7 @@ class Spans:
         times: Sequence[float],
         values: Sequence[Values],
         ways: Sequence[Values | None],
-        smooth: Curve,
+        smooth: Callable[[float], Values],
         mix: Mix,
     ) -> None:
         self.times, self.values, self.ways = tuple(times), tuple(values), tuple(ways)
@@ -259,7 +255,7 @@ class Spans:
             return self.values[index + 1]
         way = self.ways[index]
         if way is None:
-            return self.smooth.at(time)
+            return self.smooth(time)
         if not way:
             return self.values[index]
         x1, y1, x2, y2 = way

@@ -18,9 +18,7 @@ from clfractal.scene.grid_values import finite_range
 
 if TYPE_CHECKING:
     from clfractal.files.volume_file import Volume
-    from clfractal.scene.volume import Box, VolumeRenderer
-
-_WHERE = Where(path="renderer.file")
+    from clfractal.scene.volume import Box
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,16 +43,6 @@ class GivenGrid:
         found = hashlib.sha256(np.ascontiguousarray(self.values).data)
         found.update(repr(self.place).encode())
         return found.hexdigest()
-
-
-def read_given(renderer: VolumeRenderer, folder: Path) -> GivenGrid:
-    """The grid of a scene that was loaded from `folder`, in the renderer's box if it has one, else in its own place.
-
-    Raises:
-        FileError: at renderer.file, for a file out of the folder, or whatever is wrong with it.
-    """
-    assert renderer.file is not None
-    return read_grid(renderer.file, folder, _WHERE, renderer.box)
 
 
 def read_grid(file: str, folder: Path, where: Where, box: Box | None = None) -> GivenGrid:

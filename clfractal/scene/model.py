@@ -394,9 +394,10 @@ class Scene(Section):
         renderer = self.renderer
         if not isinstance(renderer, VolumeRenderer) or renderer.file is None:
             return None
-        from clfractal.scene.given import read_given
+        from clfractal.scene.given import read_grid
 
-        given = self.once("given", lambda: read_given(renderer, self.folder))
+        file, where = renderer.file, Where(path="renderer.file")
+        given = self.once("given", lambda: read_grid(file, self.folder, where, renderer.box))
         renderer.check_level(given.low, given.high)
         return given
 

@@ -197,8 +197,8 @@ class Movers:
             return _along(times, values, ways, straight, closed=closed)
         if kind == "scale" and all(number > 0 for each in values for number in each):
             logarithms = [tuple(log(number) for number in each) for each in values]
-            smooth = _Exponential(_together(times, logarithms, closed=closed))
-            return Spans(times, values, ways, smooth, _geometric)
+            smooth = _together(times, logarithms, closed=closed)
+            return Spans(times, values, ways, lambda time: _exponentials(smooth(time)), _geometric)
         return Spans(times, values, ways, _together(times, values, closed=closed), straight)
 
     def _flight_of(self, name: str) -> str | None:
@@ -326,36 +326,22 @@ class Movers:
         return at
 
 
-class _Exponential:
-    """Numbers whose logarithms follow a curve."""
-
-    def __init__(self, logarithms: Curve) -> None:
-        self._logarithms = logarithms
-
-    def at(self, time: float) -> Values:
-        return tuple(exp(min(number, _LARGEST)) for number in self._logarithms.at(time))
-
-
-class _Together:
-    """Numbers, each of which follows its own curve."""
-
-    def __init__(self, curves: Sequence[Monotone]) -> None:
-        self._curves = tuple(curves)
-
-    def at(self, time: float) -> Values:
-        return tuple(curve.number(time) for curve in self._curves)
-
-
 def _along(
     times: Sequence[float], values: Sequence[Values], ways: Sequence[Values | None], mix: Mix, *, closed: bool
 ) -> Curve:
-    return Spans(times, values, ways, Path(times, values, mix, closed=closed), mix)
+    return Spans(times, values, ways, Path(times, values, mix, closed=closed).at, mix)
 
 
-def _together(times: Sequence[float], values: Sequence[Values], *, closed: bool) -> Curve:
-    return _Together([Monotone(times, each, closed=closed) for each in zip(*values, strict=True)])
+def _together(times: Sequence[float], values: Sequence[Values], *, closed: bool) -> At:
+    """Numbers, each of which follows its own curve."""
+    curves = [Monotone(times, each, closed=closed) for each in zip(*values, strict=True)]
+    return lambda time: tuple(curve.number(time) for curve in curves)
+
+
+def _exponentials(logarithms: Values) -> Values:
+    return tuple(exp(min(number, _LARGEST)) for number in logarithms)
 
 
 def _geometric(a: Values, b: Values, share: float) -> Values:
     """The numbers that are reached from `a` by a part of the factor to `b`."""
-    return tuple(exp(min(log(x) + share * (log(y) - log(x)), _LARGEST)) for x, y in zip(a, b, strict=True))
+    return _exponentials(tuple(log(x) + share * (log(y) - log(x)) for x, y in zip(a, b, strict=True)))
