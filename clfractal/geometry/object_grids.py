@@ -9,7 +9,8 @@ import numpy.typing as npt
 
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.model import Scene
-from clfractal.scene.object_grids import placed, used_level, volumes_of
+from clfractal.scene.named_files import volumes_of
+from clfractal.scene.object_grids import placed, used_level
 from clfractal.scene.objects import VolumeObject
 from clfractal.shading.transfer import TRANSFER_SIZE, Floats, medium_table, table_bounds, value_limits
 
