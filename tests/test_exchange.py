@@ -303,12 +303,12 @@ def test_files_are_read_once(shell: InProcess, tmp_path: Path, monkeypatch: pyte
         monkeypatch.setattr(module, name, call)
 
     counted(load_module, "read_document")
-    counted(given, "read_given")
+    counted(given, "read_grid")
     assert works(shell("voxelize", "theirs.yaml", "-o", "copy.nrrd"))
-    assert sorted(read) == ["read_document", "read_given"]
+    assert sorted(read) == ["read_document", "read_grid"]
     read.clear()
     assert works(shell("mesh", "theirs.yaml", "-o", "copy.ply"))
-    assert sorted(read) == ["read_document", "read_given"]
+    assert sorted(read) == ["read_document", "read_grid"]
 
 
 def test_without_scikit_image(shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:

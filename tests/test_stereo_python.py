@@ -114,13 +114,13 @@ def test_a_volumes_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyP
     ball = (np.linalg.norm(places, axis=0) < 1).astype(np.uint8) * 255
     keep(tmp_path / "ball.nrrd", ball, [-1.2] * 3, [0.1] * 3)
     reads: list[Path] = []
-    read = given.read_given
+    read = given.read_grid
 
-    def counted(renderer: Any, folder: Path) -> Any:
+    def counted(file: str, folder: Path, *more: Any) -> Any:
         reads.append(folder)
-        return read(renderer, folder)
+        return read(file, folder, *more)
 
-    monkeypatch.setattr(given, "read_given", counted)
+    monkeypatch.setattr(given, "read_grid", counted)
     renderer = {"type": "volume", "file": "ball.nrrd"}
     for mode in ("split", "split_half"):
         reads.clear()

@@ -66,13 +66,18 @@ def watch_scene(order: Order, shell: Shell) -> None:
             if scene is not None and not _rendered(order, scene, engine, watched, shell):
                 shell.say(f"{order.scene}: changed")
             else:
-                while not watched.changed():
-                    time.sleep(_INTERVAL / 2)
+                _wait(watched)
             try:
                 scene = _read(order, watched)
             except ClfractalError as error:
                 scene = None
                 shell.refuse(str(error))
+
+
+def _wait(watched: Watched) -> None:
+    """Returns once a file has changed."""
+    while not watched.changed():
+        time.sleep(_INTERVAL / 2)
 
 
 def _read(order: Order, watched: Watched) -> Scene:
