@@ -36,9 +36,7 @@ class Kept:
 
     def __init__(self, films: Sequence[Plan], shell: Shell, *, resume: bool) -> None:
         self._films, self._shell, self._resume = tuple(films), shell, resume
-        self._folder: Path | None = None
-        if films:
-            self._folder = kept_folder(films[0].path)
+        self._folder = kept_folder(films[0].path) if films else None
 
     @property
     def patterns(self) -> Mapping[int, Path]:

@@ -12,8 +12,8 @@ import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from io import TextIOWrapper
 from typing import Any, BinaryIO, TextIO
 
@@ -137,11 +137,9 @@ class Shell:
         if sys.stdout is None:
             raise FileError("cannot be written: it is closed", Where(OUTPUT))
 
-        def write() -> None:
+        with self._to_output():
             sys.stdout.write(text if text.endswith("\n") else text + "\n")
             sys.stdout.flush()
-
-        self._to_output(write)
 
     def print_json(self, data: Any) -> None:
         """A command's result as JSON, in ASCII; errors as of `print`."""
@@ -171,17 +169,15 @@ class Shell:
         Raises:
             FileError: it cannot be written (a full disk).
         """
-
-        def write() -> None:
+        with self._to_output():
             target = self._kept or sys.stdout.buffer
             shutil.copyfileobj(stream, target, 1 << 20)
             target.flush()
 
-        self._to_output(write)
-
-    def _to_output(self, write: Callable[[], None]) -> None:
+    @contextmanager
+    def _to_output(self) -> Iterator[None]:
         try:
-            write()
+            yield
         except BrokenPipeError:
             # The reader closed the pipe, as `head` does; the rest of the output is dropped.
             self._drop_output()

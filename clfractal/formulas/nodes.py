@@ -99,9 +99,7 @@ def to_text(node: Node) -> str:
     if isinstance(node, Name):
         return node.name
     texts = [to_text(argument) for argument in node.arguments]
-    symbol = ARITHMETIC.get(node.function) or COMPARISONS.get(node.function)
-    if symbol is None and node.function in ("and", "or"):
-        symbol = node.function
+    symbol = {**ARITHMETIC, **COMPARISONS, "and": "and", "or": "or"}.get(node.function)
     if symbol is not None:
         return f"({texts[0]} {symbol} {texts[1]})"
     if node.function == "neg":

@@ -199,9 +199,7 @@ def _by_corners(low: Vector, right: Vector, high: Vector) -> Placed:
 
 def _by_normal(plane: Plane) -> Placed:
     normal = unit(plane.normal)
-    wanted = plane.up
-    if wanted is None:
-        wanted = AXES["y"] if abs(normal[1]) < 0.99 else AXES["z"]
+    wanted = plane.up or AXES["y" if abs(normal[1]) < 0.99 else "z"]
     side = unit(cross(wanted, normal))
     return Placed(plane.center, side, cross(normal, side), normal, plane.width, plane.height)
 
