@@ -316,10 +316,8 @@ def mesh(
     if isinstance(source, Volume):
         if resolution is not None:
             arguments.refuse("resolution", "applies to scenes only; the source is a volume", resolution)
-        if precision is not None:
-            precision = arguments.word("precision", precision, PRECISIONS)
         return meshes.of_volume(
-            source, device=device, level=level, close=close, precision=precision, talk=talk
+            source, device=device, level=level, close=close, precision=_precision(precision), talk=talk
         )
     wanted, coloring = _volume_scene(source, resolution, precision)
     if wanted.given is not None:
@@ -334,14 +332,15 @@ def _volume_scene(
     from clfractal.engine import grids
 
     scene, coloring = grids.as_volume(as_scene(source))
-    changes: dict[str, Any] = {}
-    if resolution is not None:
-        changes["resolution"] = resolution
-    if precision is not None:
-        changes["precision"] = arguments.word("precision", precision, PRECISIONS)
+    given = {"resolution": resolution, "precision": _precision(precision)}
+    changes = {key: value for key, value in given.items() if value is not None}
     if changes:
         scene = scene.model_copy(update={"renderer": scene.renderer.model_copy(update=changes)})
     return scene, coloring
+
+
+def _precision(given: str | None) -> str | None:
+    return None if given is None else arguments.word("precision", given, PRECISIONS)
 
 
 def _talk(progress: Callable[[str, float], None] | None) -> Talk:
