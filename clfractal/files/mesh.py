@@ -11,6 +11,7 @@ import json
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -231,34 +232,27 @@ def _y_up(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
 
 
 def _write_glb(stream: BinaryIO, mesh: Mesh, text: str) -> None:
-    parts, offset = _glb_parts(mesh), 0
-    views: list[dict[str, int]] = []
-    accessors: list[dict[str, Any]] = []
-    attributes: dict[str, int] = {}
-    for name, size, kind, shape, count in parts:
-        views.append(
-            {
-                "buffer": 0,
-                "byteOffset": offset,
-                "byteLength": size * count,
-                "target": _ARRAY if name else _ELEMENTS,
-            }
-        )
-        accessor: dict[str, Any] = {
-            "bufferView": len(accessors),
-            "componentType": kind,
-            "count": count,
-            "type": shape,
+    parts = _glb_parts(mesh)
+    *offsets, length = accumulate((size * count for _, size, _, _, count in parts), initial=0)
+    ends = _y_up(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))
+    more: dict[str, dict[str, Any]] = {
+        "POSITION": {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()},
+        "COLOR_0": {"normalized": True},
+    }
+    views = [
+        {
+            "buffer": 0,
+            "byteOffset": offset,
+            "byteLength": size * count,
+            "target": _ARRAY if name else _ELEMENTS,
         }
-        if name == "POSITION":
-            ends = _y_up(np.stack([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]))
-            accessor |= {"min": ends.min(axis=0).tolist(), "max": ends.max(axis=0).tolist()}
-        if name == "COLOR_0":
-            accessor["normalized"] = True
-        if name:
-            attributes[name] = len(accessors)
-        accessors.append(accessor)
-        offset += size * count
+        for (name, size, _, _, count), offset in zip(parts, offsets, strict=True)
+    ]
+    accessors = [
+        {"bufferView": number, "componentType": kind, "count": count, "type": shape, **more.get(name, {})}
+        for number, (name, _, kind, shape, count) in enumerate(parts)
+    ]
+    attributes = {name: number for number, (name, *_) in enumerate(parts) if name}
     scene = {
         "asset": {
             "version": "2.0",
@@ -272,15 +266,15 @@ def _write_glb(stream: BinaryIO, mesh: Mesh, text: str) -> None:
         "materials": [
             {"pbrMetallicRoughness": {"metallicFactor": 0, "roughnessFactor": 0.6}, "doubleSided": True}
         ],
-        "buffers": [{"byteLength": offset}],
+        "buffers": [{"byteLength": length}],
         "bufferViews": views,
         "accessors": accessors,
     }
     words = json.dumps(scene).encode()
     words += b" " * (-len(words) % 4)
-    stream.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(words) + 8 + offset))
+    stream.write(struct.pack("<4sII", b"glTF", 2, 12 + 8 + len(words) + 8 + length))
     stream.write(struct.pack("<I4s", len(words), b"JSON") + words)
-    stream.write(struct.pack("<I4s", offset, b"BIN\0"))
+    stream.write(struct.pack("<I4s", length, b"BIN\0"))
     for vectors in (mesh.vertices, mesh.normals):
         if vectors is not None:
             for part in _pieces(len(vectors)):
