@@ -114,24 +114,24 @@ def tell_formula(name: str) -> str:
 
 
 def _formula(formula: Formula) -> list[str]:
-    parts = [f"variables: {', '.join(formula.variables)}; adds: {formula.add}"]
-    if formula.parameters:
-        parts.append("parameters:\n" + "\n".join(f"  {_parameter(each)}" for each in formula.parameters))
-    else:
-        parts.append("parameters: none")
-    return parts
+    each = "".join(f"\n  {_parameter(parameter)}" for parameter in formula.parameters)
+    return [
+        f"variables: {', '.join(formula.variables)}; adds: {formula.add}",
+        f"parameters:{each or ' none'}",
+    ]
 
 
 def _parameter(parameter: Parameter) -> str:
     kind = {"int": "whole number", "real": "number"}[parameter.type]
-    text = f"{parameter.name}: {kind}, default {parameter.default:g}"
-    if parameter.choices:
-        text += ", one of " + ", ".join(f"{choice:g}" for choice in parameter.choices)
-    if parameter.minimum is not None:
-        text += f", at least {parameter.minimum:g}"
-    if parameter.maximum is not None:
-        text += f", at most {parameter.maximum:g}"
-    return f"{text}; {_line(parameter.description)}" if parameter.description else text
+    choices = ", ".join(f"{choice:g}" for choice in parameter.choices or ())
+    parts = [
+        f"{parameter.name}: {kind}, default {parameter.default:g}",
+        f", one of {choices}" if choices else "",
+        f", at least {parameter.minimum:g}" if parameter.minimum is not None else "",
+        f", at most {parameter.maximum:g}" if parameter.maximum is not None else "",
+        f"; {_line(parameter.description)}" if parameter.description else "",
+    ]
+    return "".join(parts)
 
 
 def _link(link: Mapping[str, Any]) -> str:

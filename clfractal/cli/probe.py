@@ -49,11 +49,9 @@ def probe_pixel(order: Order, pixel: str, shell: Shell, *, as_json: bool) -> Non
 
 
 def _text(found: Probe) -> str:
-    shown = f"pixel {found.x},{found.y}"
-    if found.view is not None:
-        shown += f", layout.views.{found.view}"
-    if found.eye is not None:
-        shown += f", {found.eye} eye"
+    view = f", layout.views.{found.view}" if found.view is not None else ""
+    eye = f", {found.eye} eye" if found.eye is not None else ""
+    shown = f"pixel {found.x},{found.y}{view}{eye}"
     if not found.hit:
         return f"{shown}: nothing is there"
     assert found.point is not None
