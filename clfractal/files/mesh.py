@@ -133,16 +133,17 @@ def _comments(text: str, mark: str) -> str:
 # --- PLY: Greg Turk, "The PLY Polygon File Format", 1994 ---
 
 
+_PLY_TYPES = {"<f8": "double", "<f4": "float", "u1": "uchar"}
+
+
 def _write_ply(stream: BinaryIO, mesh: Mesh, text: str) -> None:
-    kind, word = ("<f8", "double") if _is_fine(mesh) else ("<f4", "float")
-    fields: list[tuple[str, str]] = [(name, kind) for name in "xyz"]
-    lines = [f"property {word} {name}" for name in "xyz"]
-    if mesh.normals is not None:
-        fields += [(name, "<f4") for name in ("nx", "ny", "nz")]
-        lines += [f"property float {name}" for name in ("nx", "ny", "nz")]
-    if mesh.colors is not None:
-        fields += [(name, "u1") for name in ("red", "green", "blue")]
-        lines += [f"property uchar {name}" for name in ("red", "green", "blue")]
+    kind = "<f8" if _is_fine(mesh) else "<f4"
+    fields = [
+        *((name, kind) for name in "xyz"),
+        *((name, "<f4") for name in ("nx", "ny", "nz") if mesh.normals is not None),
+        *((name, "u1") for name in ("red", "green", "blue") if mesh.colors is not None),
+    ]
+    lines = [f"property {_PLY_TYPES[kind]} {name}" for name, kind in fields]
     head = (
         f"ply\nformat binary_little_endian 1.0\n{_comments(text, 'comment')}"
         f"element vertex {len(mesh.vertices)}\n" + "\n".join(lines) + "\n"
@@ -151,11 +152,11 @@ def _write_ply(stream: BinaryIO, mesh: Mesh, text: str) -> None:
     stream.write(head.encode("ascii"))
     for part in _pieces(len(mesh.vertices)):
         rows = np.empty(part.stop - part.start, fields)
-        columns = [mesh.vertices[part].T]
-        if mesh.normals is not None:
-            columns.append(mesh.normals[part].T)
-        if mesh.colors is not None:
-            columns.append(np.rint(255 * _srgb(mesh.colors[part])).T)
+        columns = [
+            mesh.vertices[part].T,
+            *([mesh.normals[part].T] if mesh.normals is not None else []),
+            *([np.rint(255 * _srgb(mesh.colors[part])).T] if mesh.colors is not None else []),
+        ]
         for (name, _), column in zip(fields, np.concatenate(columns), strict=True):
             rows[name] = column
         stream.write(rows.tobytes())
@@ -215,13 +216,12 @@ def _write_lines(stream: BinaryIO, line: str, rows: npt.NDArray[Any]) -> None:
 def _glb_parts(mesh: Mesh) -> list[tuple[str, int, int, str, int]]:
     """Attribute, bytes of an element, type of its components, its shape, and how many; the indices last."""
     count = len(mesh.vertices)
-    parts = [("POSITION", 12, _FLOAT, "VEC3", count)]
-    if mesh.normals is not None:
-        parts.append(("NORMAL", 12, _FLOAT, "VEC3", count))
-    if mesh.colors is not None:
-        parts.append(("COLOR_0", 8, _USHORT, "VEC4", count))
-    parts.append(("", 4, _UINT, "SCALAR", 3 * len(mesh.triangles)))
-    return parts
+    return [
+        ("POSITION", 12, _FLOAT, "VEC3", count),
+        *([("NORMAL", 12, _FLOAT, "VEC3", count)] if mesh.normals is not None else []),
+        *([("COLOR_0", 8, _USHORT, "VEC4", count)] if mesh.colors is not None else []),
+        ("", 4, _UINT, "SCALAR", 3 * len(mesh.triangles)),
+    ]
 
 
 def _y_up(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
