@@ -100,16 +100,13 @@ def tell_formula(name: str) -> str:
         FileError: it cannot be read.
     """
     data, chain = catalog.described(name, Path())
+    links = "".join(f"\n  {_link(link)}" for link in data.get("chain", ()))
     parts = [
         f"{name}: {_line(data.get('title', name))}",
         f"reference: {_line(data.get('reference', 'none'))}",
+        *([textwrap.fill(_line(data["description"]), _WIDTH)] if data.get("description") else []),
+        *([f"a chain, in turn:{links}"] if "chain" in data else _formula(chain.first.formula)),
     ]
-    if data.get("description"):
-        parts.append(textwrap.fill(_line(data["description"]), _WIDTH))
-    if "chain" in data:
-        parts.append("a chain, in turn:\n" + "\n".join(f"  {_link(link)}" for link in data["chain"]))
-    else:
-        parts += _formula(chain.first.formula)
     return "\n\n".join(parts)
 
 

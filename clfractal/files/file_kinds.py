@@ -21,6 +21,13 @@ _BY_ENDING: dict[str, Kind] = {
     **{ending: kind for kind, endings in _PICTURES.items() for ending in endings},
     **dict.fromkeys((".nrrd", ".nhdr", ".npy"), "volume"),
 }
+_BEGINNINGS: dict[bytes, Kind] = {
+    b"\x76\x2f\x31\x01": "exr",
+    b"\x89PNG\r\n\x1a\n": "png",
+    b"\xff\xd8\xff": "photo",
+    b"NRRD000": "volume",
+    b"\x93NUMPY": "volume",
+}
 
 
 def kind_of(path: Path) -> Kind | None:
@@ -39,15 +46,9 @@ def kind_of(path: Path) -> Kind | None:
 
 def kind_of_start(start: bytes) -> Kind | None:
     """The kind of a file that begins with these bytes, twelve or more of them."""
-    if start.startswith(b"\x76\x2f\x31\x01"):
-        return "exr"
-    if start.startswith(b"\x89PNG\r\n\x1a\n"):
-        return "png"
-    if start.startswith(b"\xff\xd8\xff") or (start[:4] == b"RIFF" and start[8:12] == b"WEBP"):
+    if start[:4] == b"RIFF" and start[8:12] == b"WEBP":
         return "photo"
-    if start.startswith((b"NRRD000", b"\x93NUMPY")):
-        return "volume"
-    return None
+    return next((kind for begin, kind in _BEGINNINGS.items() if start.startswith(begin)), None)
 
 
 def _is_text(start: bytes) -> bool:

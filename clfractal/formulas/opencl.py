@@ -175,15 +175,9 @@ class _ChainWriter:
         self.starts_at_first = chain.add == "point" and not self.starts_at_zero
 
     def write(self) -> _Written:
-        parts = [self._has_usual_values()]
-        number_types: tuple[NumberType, ...] = ("real", "dual")
-        for number_type in number_types:
-            parts.append(self._start(number_type))
-            parts.extend(self._apply(index, number_type, usual=usual) for index, usual in self.ways)
-            parts.append(self._dispatch(number_type, derivative=False))
-            parts.append(self._solid_distance(self.chain.shape_index, number_type))
+        parts = [self._has_usual_values(), *self._of_type("real"), *self._of_type("dual")]
         if self.has_derivative:
-            parts.extend(self._apply_derivative(index, usual=usual) for index, usual in self.ways)
+            parts += (self._apply_derivative(index, usual=usual) for index, usual in self.ways)
             parts.append(self._dispatch("real", derivative=True))
         facts = Facts(
             self.width,
@@ -203,6 +197,15 @@ class _ChainWriter:
                 for slot, (owner, node) in enumerate(self.constants.owners)
             ),
         )
+
+    def _of_type(self, number_type: NumberType) -> list[str]:
+        """The functions over one number type."""
+        return [
+            self._start(number_type),
+            *(self._apply(index, number_type, usual=usual) for index, usual in self.ways),
+            self._dispatch(number_type, derivative=False),
+            self._solid_distance(self.chain.shape_index, number_type),
+        ]
 
     def _has_usual_values(self) -> str:
         """Whether all parameters have the values that are literals."""
