@@ -106,10 +106,11 @@ class Movers:
         return SceneError(message, Where(path=f"animation.tracks.{name}.{key}"))
 
     def _check_size(self, name: str, key: str, given: int) -> None:
-        try:
-            self.targets[name].check_size(given)
-        except SceneError as error:
-            raise self._wrong(name, key, error.message) from None
+        target = self.targets[name]
+        if target.size not in (None, given):
+            wanted = "a number" if target.size == 1 else f"a list of {target.size} numbers"
+            got = given if given > 1 else "one"
+            raise self._wrong(name, key, f"must be {wanted} for {'.'.join(target.path)}, got {got}")
 
     # -- keys
 

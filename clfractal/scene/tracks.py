@@ -41,14 +41,6 @@ class Target:
     kind: Kind
     size: int | None
 
-    def check_size(self, given: int) -> None:
-        """Raises SceneError, without a place, if a value of so many numbers does not fit."""
-        if self.size not in (None, given):
-            wanted = "a number" if self.size == 1 else f"a list of {self.size} numbers"
-            raise SceneError(
-                f"must be {wanted} for {'.'.join(self.path)}, got {given if given > 1 else 'one'}"
-            )
-
 
 def target_of(scene: Scene, name: str) -> Target:
     """The value that a track of this name moves.
