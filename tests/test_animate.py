@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.cli.film_parts import Part
+from clfractal.cli.film_parts import frames_of
 from clfractal.engine import run as work
 from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
@@ -265,7 +265,7 @@ def test_arguments_of_python_are_checked() -> None:
 
 
 def test_numbers_and_names_of_frames() -> None:
-    assert list(Part("3").numbers(5)) == [3]
-    assert list(Part(" 0-4:2 ").numbers(5)) == [0, 2, 4]
+    assert list(frames_of("3", 5)) == [3]
+    assert list(frames_of(" 0-4:2 ", 5)) == [0, 2, 4]
     assert frame_file(Path("a/f_###.png"), 7) == Path("a/f_007.png")
     assert frame_file(Path("a#b##.exr"), 1234) == Path("a#b1234.exr")

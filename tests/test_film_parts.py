@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 import clfractal
-from clfractal.cli.film_parts import Part, ranges, shown_ranges
+from clfractal.cli.film_parts import frames_of, ranges, shown_ranges
 from clfractal.cli.film_sheet import MOST_FRAMES, spread
 from clfractal.files.whole import is_whole
 from tests.shell import InProcess
@@ -33,7 +33,7 @@ animation:
 @given(st.sets(st.integers(0, 60)))
 def test_ranges_name_the_numbers(numbers: set[int]) -> None:
     found = list(ranges(sorted(numbers)))
-    again = [number for text in found for number in Part(text).numbers(61)]
+    again = [number for text in found for number in frames_of(text, 61)]
     assert again == sorted(numbers)
     gaps = sum(number + 1 not in numbers for number in numbers)
     assert len(found) == gaps

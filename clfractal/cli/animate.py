@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.cli.engines import engine_of, shares_of
-from clfractal.cli.film_parts import Part, check_pattern, missing, ranges, shown_ranges
+from clfractal.cli.film_parts import check_pattern, frames_of, missing, ranges, shown_ranges
 from clfractal.cli.kept import Kept
 from clfractal.cli.order import naming_options
 from clfractal.cli.pipes import piped, refuse_stream
@@ -38,7 +38,7 @@ _LONG_FRAME = 2.0
 _ADVICE = "remove it, or render without --resume"
 
 
-def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
+def animate_scene(order: Order, part: str | None, recipe: Recipe, shell: Shell) -> None:
     """Renders the frames of a scene's animation, each to its own files, and makes films of them.
 
     A frame's files appear complete or not at all. With `order.resume` frames that are there are kept; those of another
@@ -57,12 +57,12 @@ def animate_scene(order: Order, part: Part, recipe: Recipe, shell: Shell) -> Non
         _animate(named, part, recipe, shell)
 
 
-def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
+def _animate(order: Order, part: str | None, recipe: Recipe, shell: Shell) -> None:
     begun = time.perf_counter()
     scene = ordered_scene(order)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation
-    numbers = part.numbers(animation.count)
+    numbers = frames_of(part, animation.count)
     films = _planned_films(order, scene, recipe, animation.fps)
     patterns = [path for path in order.outputs if not is_film(path)]
     if not order.outputs:
@@ -102,7 +102,7 @@ def _animate(order: Order, part: Part, recipe: Recipe, shell: Shell) -> None:
         shell.say(sentence(values))
 
 
-def list_missing(order: Order, part: Part, shell: Shell) -> None:
+def list_missing(order: Order, part: str | None, shell: Shell) -> None:
     """Prints which frames of numbered pictures are missing, or not whole: a line for each range, as `--frames` takes it.
 
     Raises:
@@ -118,7 +118,7 @@ def list_missing(order: Order, part: Part, shell: Shell) -> None:
     with piped(shell, order.scene, ()) as files:
         scene = ordered_scene(replace(order, scene=files.source, folder=files.folder))
         with speaking_of(order.scene):
-            numbers = part.numbers(movement_of(scene).animation.count)
+            numbers = frames_of(part, movement_of(scene).animation.count)
         patterns = [*order.outputs] or [_usual(order)]
         for found in ranges(_missing(scene, patterns, numbers)):
             shell.print(found)

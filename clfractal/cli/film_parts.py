@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 
@@ -16,33 +15,26 @@ _MOST_DIGITS = 12
 _MOST_RANGES = 8
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
-    """The frames to render: `--frames A-B:STEP`, `A-B`, `A` or all of them."""
+def frames_of(part: str | None, count: int) -> range:
+    """The frames of a film of `count` frames that are to be rendered: `--frames A-B:STEP`, `A-B`, `A` or all of them.
 
-    text: str | None = None
-
-    def numbers(self, count: int) -> range:
-        """The frames of a film of `count` frames.
-
-        Raises:
-            SceneError: the text has another form, or names a frame that the film does not have.
-        """
-        if self.text is None:
-            return range(count)
-        found = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9})(?::(\d{1,9}))?)?", self.text.strip(), re.ASCII)
-        if found is None:
-            raise SceneError(
-                f"must be A-B, A-B:STEP or a number, such as 0-119:2; got {self.text[:60]!r}",
-                Where("--frames"),
-            )
-        first = int(found[1])
-        last, step = int(found[2] or first), int(found[3] or 1)
-        if step < 1 or last < first:
-            raise SceneError(f"must go upwards, got {self.text[:60]!r}", Where("--frames"))
-        if last >= count:
-            raise SceneError(f"must be frames 0 to {count - 1} of the film, got {last}", Where("--frames"))
-        return range(first, last + 1, step)
+    Raises:
+        SceneError: the text has another form, or names a frame that the film does not have.
+    """
+    if part is None:
+        return range(count)
+    found = re.fullmatch(r"(\d{1,9})(?:-(\d{1,9})(?::(\d{1,9}))?)?", part.strip(), re.ASCII)
+    if found is None:
+        raise SceneError(
+            f"must be A-B, A-B:STEP or a number, such as 0-119:2; got {part[:60]!r}", Where("--frames")
+        )
+    first = int(found[1])
+    last, step = int(found[2] or first), int(found[3] or 1)
+    if step < 1 or last < first:
+        raise SceneError(f"must go upwards, got {part[:60]!r}", Where("--frames"))
+    if last >= count:
+        raise SceneError(f"must be frames 0 to {count - 1} of the film, got {last}", Where("--frames"))
+    return range(first, last + 1, step)
 
 
 def check_pattern(path: Path) -> None:

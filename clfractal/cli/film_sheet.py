@@ -6,7 +6,7 @@ import time
 from dataclasses import replace
 from pathlib import Path
 
-from clfractal.cli.film_parts import Part
+from clfractal.cli.film_parts import frames_of
 from clfractal.cli.order import Order
 from clfractal.cli.pipes import piped, refuse_stream
 from clfractal.cli.render import ordered_scene
@@ -22,7 +22,7 @@ _LONGER_SIDE = 240
 _CHANNELS = ("R", "G", "B", "A")
 
 
-def preview_film(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
+def preview_film(order: Order, sheet: Path, part: str | None, shell: Shell) -> None:
     """Renders small frames, spread evenly over the film, and puts them on a sheet, each with its number and time.
 
     Frames are as `clfractal vary` shows scenes: with few samples, for one eye, and without motion blur.
@@ -39,14 +39,14 @@ def preview_film(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
         _preview(replace(order, scene=files.source, folder=files.folder), sheet, part, shell)
 
 
-def _preview(order: Order, sheet: Path, part: Part, shell: Shell) -> None:
+def _preview(order: Order, sheet: Path, part: str | None, shell: Shell) -> None:
     from clfractal.images.formats import check_output
 
     begun = time.perf_counter()
     scene = ordered_scene(order)
     with speaking_of(order.scene):
         animation = movement_of(scene).animation
-    numbers = spread(part.numbers(animation.count))
+    numbers = spread(frames_of(part, animation.count))
     size = (scene.image.width, scene.image.height) if order.size is not None else _small(scene)
     check_output(sheet)
     refuse_overwriting([sheet], scene.files)

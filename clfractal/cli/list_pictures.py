@@ -138,7 +138,6 @@ def animate(
 ) -> Work:
     """Render the frames of a scene's animation to numbered picture files, or films."""
     from clfractal.cli.animate import animate_scene, list_missing
-    from clfractal.cli.film_parts import Part
     from clfractal.cli.film_sheet import preview_film
     from clfractal.cli.order import Order
     from clfractal.files.film_kinds import Recipe
@@ -159,10 +158,10 @@ def animate(
     )
     recipe = Recipe(codec, bits, chroma, crf)
     if missing:
-        return lambda: list_missing(order, Part(frames), context.obj)
+        return lambda: list_missing(order, frames, context.obj)
     if preview is not None:
-        return lambda: preview_film(order, preview, Part(frames), context.obj)
-    return lambda: animate_scene(order, Part(frames), recipe, context.obj)
+        return lambda: preview_film(order, preview, frames, context.obj)
+    return lambda: animate_scene(order, frames, recipe, context.obj)
 
 
 @command
