@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from clfractal.scene.atmosphere import EARTH, SUN_RADIUS, Atmosphere, Doubles
+from clfractal.scene.grid_place import vector_of
 from clfractal.scene.sky import EYE, to_rgb
 from clfractal.schema.base import Vector
 
@@ -58,10 +59,7 @@ class Sun:
         seen = (square < 1) & (directions[..., 2] > self.horizon)
         height = np.where(seen, apart[..., 2] / _CHORD, 0)[..., None]
         limb = np.where(seen, 1 - square, 0)[..., None] ** (np.array(LIMB) / 2)
-        found: Doubles = (
-            np.array(self.light) * limb * np.exp(height * (self.fade + height * np.array(self.bend)))
-        )
-        return found
+        return np.array(self.light) * limb * np.exp(height * (self.fade + height * np.array(self.bend)))
 
 
 @lru_cache(maxsize=4)
@@ -91,7 +89,7 @@ def sun_of(sky: Sky) -> Sun | None:
     shape = np.exp(height[..., None] * (fade + height[..., None] * bend)) * limb
     light = irradiance / np.maximum(shape.mean(axis=(0, 1)) * SOLID_ANGLE, 1e-30) / edge
     toward = (level * sin(azimuth), level * cos(azimuth), middle)
-    return Sun(toward, _vector(light), _vector(fade), _vector(bend), horizon, _vector(irradiance))
+    return Sun(toward, vector_of(light), vector_of(fade), vector_of(bend), horizon, vector_of(irradiance))
 
 
 def _fitted(heights: Doubles, light: Doubles) -> tuple[Doubles, Doubles]:
@@ -103,8 +101,3 @@ def _fitted(heights: Doubles, light: Doubles) -> tuple[Doubles, Doubles]:
             bend, slope, _ = np.polyfit(heights[lit], np.log(values[lit]), 2, w=values[lit] / values.max())
             found[:, channel] = slope, bend
     return found[0], found[1]
-
-
-def _vector(numbers: Doubles) -> Vector:
-    red, green, blue = (float(each) for each in numbers)
-    return red, green, blue
