@@ -5,7 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from types import TracebackType
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from clfractal.cli.shell import Shell
 from clfractal.device.activity import Activity, current
@@ -180,7 +180,7 @@ def _new_bar(shell: Shell, tiles: int) -> Bar:
     return _started(shell, "rendering", tiles, TaskProgressColumn(), *columns, **words)
 
 
-def _started(shell: Shell, doing: str, total: int, *columns: ProgressColumn, **words: str) -> Bar:
+def _started(shell: Shell, doing: str, total: int, *columns: ProgressColumn, **words: Any) -> Bar:
     from rich.console import Console
     from rich.progress import BarColumn, TextColumn
     from rich.progress import Progress as Bar

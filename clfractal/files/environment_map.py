@@ -144,8 +144,7 @@ def _to_xyz(chromaticities: tuple[float, ...]) -> Doubles:
     columns = np.stack([x, y, 1 - x - y])
     white = columns[:, 3] / y[3]
     primaries = columns[:, :3]
-    matrix: Doubles = primaries * np.linalg.solve(primaries, white)
-    return matrix
+    return primaries * np.linalg.solve(primaries, white)
 
 
 def _adaptation(chromaticities: tuple[float, ...]) -> Doubles:
@@ -153,5 +152,4 @@ def _adaptation(chromaticities: tuple[float, ...]) -> Doubles:
     whites = [
         _BRADFORD @ np.array([x / y, 1.0, (1 - x - y) / y]) for x, y in (chromaticities[6:], _REC709[6:])
     ]
-    matrix: Doubles = np.linalg.solve(_BRADFORD, np.diag(whites[1] / whites[0]) @ _BRADFORD)
-    return matrix
+    return np.linalg.solve(_BRADFORD, np.diag(whites[1] / whites[0]) @ _BRADFORD)

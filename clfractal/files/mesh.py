@@ -225,10 +225,9 @@ def _glb_parts(mesh: Mesh) -> list[tuple[str, int, int, str, int]]:
 
 
 def _y_up(vectors: npt.NDArray[Any]) -> npt.NDArray[np.float32]:
-    turned: npt.NDArray[np.float32] = np.stack(
+    return np.stack(
         [vectors[:, 0], vectors[:, 2], -vectors[:, 1]], axis=1, dtype=np.float32, casting="same_kind"
     )
-    return turned
 
 
 def _write_glb(stream: BinaryIO, mesh: Mesh, text: str) -> None:

@@ -164,8 +164,7 @@ def start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], l
 
 
 def _norm(state: Sequence[Float]) -> Float:
-    square: Float = np.sqrt(sum((z * z for z in state[1:]), start=state[0] * state[0]))
-    return square
+    return np.sqrt(sum((z * z for z in state[1:]), start=state[0] * state[0]))
 
 
 def _gradient(state: Sequence[Any], radius: Float) -> Float:

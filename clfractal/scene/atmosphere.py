@@ -110,8 +110,7 @@ def sun_visible(radius: Doubles, mu: Doubles) -> Doubles:
     """Which part of the sun stands above the horizon, its middle being at `mu`: about, 0 to 1."""
     dip = np.arccos(np.minimum(EARTH / radius, 1.0))
     part = np.clip((np.arcsin(np.clip(mu, -1, 1)) + dip) / (2 * SUN_RADIUS) + 0.5, 0, 1)
-    found: Doubles = part * part * (3 - 2 * part)
-    return found
+    return part * part * (3 - 2 * part)
 
 
 def _to_sphere(radius: Doubles, mu: Doubles, sphere: float) -> Doubles:
@@ -284,5 +283,4 @@ def _sums(one: Singles, other: Singles) -> Singles:
 def rayleigh_depth(micrometres: Doubles) -> Doubles:
     """Vertical optical depth of the air's molecules above the sea."""
     square = micrometres**-2
-    found: Doubles = 0.008569 * square**2 * (1 + 0.0113 * square + 0.00013 * square**2)
-    return found
+    return 0.008569 * square**2 * (1 + 0.0113 * square + 0.00013 * square**2)

@@ -1,7 +1,7 @@
 """Where a camera is: position, target and up, and shorter ways to say them, resolved when a scene is read."""
 
 from collections.abc import Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
@@ -121,8 +121,7 @@ class CameraBase(Section):
     @property
     def said(self) -> Mapping[str, Any]:
         """Position, target, up, orbit, roll, frame and shift as they were given, before the words were applied."""
-        found: Mapping[str, Any] = self.__dict__[_SAID]
-        return found
+        return cast(Mapping[str, Any], self.__dict__[_SAID])
 
     def _remember(self, said: Mapping[str, Any]) -> None:
         # Beside the fields, as it is no part of what makes two cameras equal.

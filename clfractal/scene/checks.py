@@ -308,8 +308,13 @@ def _check_lights(scene: Scene) -> None:
             raise inside_of("the object", index, position)
 
 
-# Whether a point is in what is joined, by whether it is in the first and in the second; of others, in one of them.
-_JOINED: Mapping[str, Callable[[bool, bool], bool]] = {"cut": gt, "intersection": and_}
+# Whether a point is in what is joined, by whether it is in the first and in the second.
+_JOINED: Mapping[str, Callable[[bool, bool], bool]] = {
+    "cut": gt,
+    "intersection": and_,
+    "union": or_,
+    "smooth_union": or_,
+}
 
 
 def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:
@@ -322,7 +327,7 @@ def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_AP
         else:
             assert isinstance(each, Simple)
             more = [each.holds(point) for point in points]
-        found = [_JOINED.get(each.join, or_)(a, b) for a, b in zip(found, more, strict=True)]
+        found = [_JOINED[each.join](a, b) for a, b in zip(found, more, strict=True)]
     return found
 
 

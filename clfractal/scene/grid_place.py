@@ -66,8 +66,7 @@ class GridPlace:
     @property
     def ends(self) -> Doubles:
         """The eight corners, scene units; shape (8, 3)."""
-        found: Doubles = np.array(self.corner) + _CORNERS @ self.edges
-        return found
+        return np.array(self.corner) + _CORNERS @ self.edges
 
     @property
     def box(self) -> Doubles:
@@ -95,8 +94,7 @@ class GridPlace:
 
     def own(self, points: npt.ArrayLike) -> Doubles:
         """The grid's own coordinates of points of the scene, shape (..., 3)."""
-        found: Doubles = (np.asarray(points, float) - self.corner) @ self.inverse.T
-        return found
+        return (np.asarray(points, float) - self.corner) @ self.inverse.T
 
     def moved(self, middle: npt.ArrayLike, factor: float = 1.0) -> GridPlace:
         """The same grid with its middle at a point of the scene, and larger by a factor."""

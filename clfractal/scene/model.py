@@ -271,8 +271,7 @@ class Scene(Section):
             with noting() as files:
                 self._read[name] = read()
             self.note_files(files)
-        found: T = self._read[name]
-        return found
+        return cast(T, self._read[name])
 
     def derived(self, make: "Callable[[Scene], T]") -> T:
         """What `make` gives, which looks at nothing but a scene: made anew only if a section has changed that it read.
@@ -283,8 +282,7 @@ class Scene(Section):
         if known is None or any(present[name] is not section for name, section in known[0].items()):
             read = _Reads(self)
             known = self._derived[make] = (read.sections, make(cast(Scene, read)))
-        found: T = known[1]
-        return found
+        return cast(T, known[1])
 
     def read_by(self, make: "Callable[[Scene], Any]") -> Mapping[str, Any]:
         """The sections that `make` has read when it was `derived`."""

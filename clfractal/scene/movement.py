@@ -180,12 +180,13 @@ def movement_of(scene: Scene) -> Movement:
 def _seeds(scene: Scene, frame: int) -> dict[tuple[str, ...], int]:
     """The seed of each renderer of a scene in a frame, by path."""
     views = scene.layout.views if scene.layout is not None else ()
-    renderers: dict[tuple[str, ...], Renderer | None] = {("renderer",): scene.renderer} | {
-        ("layout", "views", str(number), "renderer"): view.renderer for number, view in enumerate(views)
-    }
+    renderers: list[tuple[tuple[str, ...], Renderer | None]] = [
+        (("renderer",), scene.renderer),
+        *((("layout", "views", str(number), "renderer"), view.renderer) for number, view in enumerate(views)),
+    ]
     return {
         (*path, "seed"): (renderer.seed + frame) % 2**32
-        for path, renderer in renderers.items()
+        for path, renderer in renderers
         if renderer is not None
     }
 

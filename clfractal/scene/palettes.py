@@ -68,14 +68,13 @@ def table(palette: Palette, size: int) -> npt.NDArray[np.float32]:
 
 def to_oklab(linear: Floats) -> Floats:
     """Linear Rec. 709 to Oklab (lightness, green-red, blue-yellow), shape (..., 3); white is (1, 0, 0)."""
-    lab: Floats = np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
-    return lab
+    found: Floats = np.cbrt(linear @ _TO_CONES.T) @ _TO_LAB.T
+    return found
 
 
 def from_oklab(lab: Floats) -> Floats:
     """Oklab to linear Rec. 709, shape (..., 3); colours outside the gamut have negative components."""
-    linear: Floats = (lab @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T
-    return linear
+    return (lab @ np.linalg.inv(_TO_LAB).T) ** 3 @ np.linalg.inv(_TO_CONES).T
 
 
 def _smooth(knots: Floats, places: Floats, periodic: bool) -> Floats:
@@ -99,5 +98,5 @@ def _smooth(knots: Floats, places: Floats, periodic: bool) -> Floats:
     # Hermite's four polynomials.
     bend = slopes[first] * (1 - t) - slopes[first + 1] * t
     rise = (beyond - before) * (1 - 2 * t)
-    result: Floats = before + (beyond - before) * t + t * (1 - t) * (bend - rise)
-    return result
+    found: Floats = before + (beyond - before) * t + t * (1 - t) * (bend - rise)
+    return found

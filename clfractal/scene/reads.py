@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any, ClassVar, TypeVar
+from typing import Any, ClassVar, TypeVar, cast
 
 T = TypeVar("T")
 
@@ -69,14 +69,12 @@ class Reads:
     @property
     def folder(self) -> Path:
         """As of the scene, whose copies have the same one."""
-        folder: Path = self._scene.folder
-        return folder
+        return cast(Path, self._scene.folder)
 
     def once(self, name: str, read: Callable[[], T]) -> T:
         """As of the scene; data depend on the section that names them."""
         self._note([section_of(name)] if is_data(name) else self._present)
-        found: T = self._scene.once(name, read)
-        return found
+        return cast(T, self._scene.once(name, read))
 
     def derived(self, make: Callable[[Any], T]) -> T:
         """As of the scene; it depends on what that has read."""

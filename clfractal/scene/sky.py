@@ -80,16 +80,14 @@ def to_rgb(spectrum: Doubles) -> Doubles:
 def pixel_areas() -> Doubles:
     """Of the pixels of each row, steradians, shape (HEIGHT,)."""
     borders = np.cos(np.linspace(0, pi, HEIGHT + 1))
-    found: Doubles = (borders[:-1] - borders[1:]) * (2 * pi / WIDTH)
-    return found
+    return (borders[:-1] - borders[1:]) * (2 * pi / WIDTH)
 
 
 @lru_cache(maxsize=1)
 def _spectrum_to_rgb() -> Doubles:
     def lobe(middle: float, left: float, right: float) -> Doubles:
         offset = WAVELENGTHS - middle
-        found: Doubles = np.exp(-0.5 * (offset * np.where(offset < 0, left, right)) ** 2)
-        return found
+        return np.exp(-0.5 * (offset * np.where(offset < 0, left, right)) ** 2)
 
     x = 0.362 * lobe(442.0, 0.0624, 0.0374) + 1.056 * lobe(599.8, 0.0264, 0.0323)
     x -= 0.065 * lobe(501.1, 0.0490, 0.0382)

@@ -59,7 +59,10 @@ class Sun:
         seen = (square < 1) & (directions[..., 2] > self.horizon)
         height = np.where(seen, apart[..., 2] / _CHORD, 0)[..., None]
         limb = np.where(seen, 1 - square, 0)[..., None] ** (np.array(LIMB) / 2)
-        return np.array(self.light) * limb * np.exp(height * (self.fade + height * np.array(self.bend)))
+        found: Doubles = (
+            np.array(self.light) * limb * np.exp(height * (self.fade + height * np.array(self.bend)))
+        )
+        return found
 
 
 @lru_cache(maxsize=4)

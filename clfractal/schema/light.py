@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from math import radians, sin
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any, ClassVar, cast
 
 from pydantic import Field
 
@@ -64,8 +64,7 @@ class LightBase(Element):
     @property
     def stands_at(self) -> Vector | None:
         """Where it stands, its `position`; None: infinitely far away, or in many places."""
-        place: Vector | None = getattr(self, "position", None)
-        return place
+        return cast(Vector | None, getattr(self, "position", None))
 
     @property
     def reads(self) -> str | None:

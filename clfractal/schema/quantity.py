@@ -1,6 +1,6 @@
 """What the colours of a surface, and values of its materials, may follow."""
 
-from typing import Any, ClassVar, Literal, TypeAlias
+from typing import Any, ClassVar, Literal, TypeAlias, cast
 
 from pydantic import GetJsonSchemaHandler
 from pydantic_core import CoreSchema
@@ -69,8 +69,7 @@ def colorings() -> tuple[type[ColoringKind], ...]:
 
 def coloring_kind(word: str) -> type[ColoringKind]:
     """The kind that a word chooses."""
-    kind: type[ColoringKind] = by_word("colorings")[word]
-    return kind
+    return cast(type[ColoringKind], by_word("colorings")[word])
 
 
 class ByQuantity(Section):
