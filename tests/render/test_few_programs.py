@@ -123,48 +123,65 @@ def texts(given: Scene, device: Device, **plan: Any) -> dict[str, str]:
     return {each.name: each.flat.text for each in program_texts(given, plan_of(given, device, **plan))}
 
 
-@pytest.mark.parametrize("feature", FEATURES)
-def test_a_feature_is_data(feature: str, device: Device) -> None:
-    sections, more = FEATURES[feature]
-    plain = texts(scene(FORMULA), device)
-    found = texts(scene(FORMULA, **sections), device)
-    assert set(found) == set(plain) | more
-    assert all(found[name] == text for name, text in plain.items())
-
-
-@pytest.mark.parametrize("feature", FEATURES_OF_PATHS)
-def test_a_feature_of_paths_is_data(feature: str, device: Device) -> None:
-    sections, more = FEATURES_OF_PATHS[feature]
-    plain = texts(scene(FORMULA, **PATHS), device)
-    found = texts(scene(FORMULA, **PATHS, **sections), device)
-    assert set(found) ^ set(plain) == more
-    assert {name: text for name, text in found.items() if plain.get(name, text) != text} == {}
-
-
-@pytest.mark.parametrize("feature", ["lens", "objects", "cut", "mirror"])
-def test_a_program_has_the_same_kernels_for_all(feature: str, device: Device) -> None:
-    """What is kept of it would else have to be made again."""
-    plain, other = (
-        {each.name: each.kernels for each in program_texts(given, plan_of(given, device))}
-        for given in (scene(FORMULA), scene(FORMULA, **FEATURES[feature][0]))
+@pytest.mark.parametrize(
+    ("common", "sections", "more"),
+    [*(({}, *each) for each in FEATURES.values()), *((PATHS, *each) for each in FEATURES_OF_PATHS.values())],
+    ids=[*FEATURES, *(f"{name} of paths" for name in FEATURES_OF_PATHS)],
+)
+def test_a_feature_is_data(
+    common: dict[str, Any], sections: dict[str, Any], more: set[str], device: Device
+) -> None:
+    """Programs have the same texts and kernels: what is kept of them would else have to be made again."""
+    plain, found = (
+        {each.name: each for each in program_texts(given, plan_of(given, device))}
+        for given in (scene(FORMULA, **common), scene(FORMULA, **common, **sections))
     )
-    assert all(other[name] == kernels for name, kernels in plain.items())
+    assert set(found) ^ set(plain) == more
+    for name in found.keys() & plain.keys():
+        assert (found[name].flat.text, found[name].kernels) == (plain[name].flat.text, plain[name].kernels)
+
+
+# Of a feature kinds that are one program, and settings that are numbers.
+POWERS = [1.5, *(2 + 0.5 * step for step in range(45)), 2.71, 8.001, 31.5, 32]
+KINDS: dict[str, list[dict[str, Any]]] = {
+    "colours": [FEATURES[each][0] for each in ("trap", "thickness", "layer")],
+    "planes": [FEATURES[each][0] for each in ("cut", "quads", "stack")],
+    "normals and points": [
+        {"renderer": each}
+        for each in (
+            {"points": {"pattern": "grid", "count": 9}},
+            {"points": {"pattern": "stochastic", "count": 4}},
+            {"normal": "least_squares"},
+            {"normal": "one_triangle"},
+            {"normal": "eight_triangles_shading"},
+            {"normal": "eight_triangles_normal"},
+        )
+    ],
+    "points by steps": [{"renderer": {"search": "steps", **more}} for more in ({}, {"points": {"count": 4}})],
+    "powers, of programs that know the formula too": [
+        {
+            "formula": {**FORMULA, "parameters": {"power": power}},
+            "coloring": {"by": "trap", "trap": {"shape": "sphere"}},
+            "glow": {"by": "trap"},
+        }
+        for power in POWERS
+    ],
+}
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_kinds_of_a_feature_are_one_program(kind: str, device: Device) -> None:
+    first, *others = (texts(scene(**each), device) for each in KINDS[kind])
+    for name in first:
+        assert all(
+            other[name] == first[name] for other in others if kind != "points by steps" or name == "steps"
+        )
 
 
 def test_layers_and_cryptomatte_are_data(device: Device) -> None:
-    plain = texts(scene(FORMULA), device, channels=("R", "A"))
-    assert (
-        texts(scene(FORMULA), device, channels=("R", "albedo.R", "direct.G", "object", "CryptoObject00.R"))
-        == plain
-    )
-
-
-@pytest.mark.parametrize(
-    "features", [("trap", "thickness"), ("trap", "layer"), ("cut", "quads"), ("cut", "stack")]
-)
-def test_kinds_of_a_feature_are_one_program(features: tuple[str, str], device: Device) -> None:
-    one, other = (texts(scene(FORMULA, **FEATURES[each][0]), device) for each in features)
-    assert one == other
+    every = ("R", "albedo.R", "direct.G", "object", "CryptoObject00.R")
+    plain, found = (texts(scene(FORMULA), device, channels=names) for names in (("R", "A"), every))
+    assert found == plain
 
 
 GRID = {"type": "volume", "box": {"center": [0, 0, 0], "size": 2.4}, "resolution": 16}
@@ -247,19 +264,6 @@ def test_what_a_cut_plane_shows_is_data(device: Device) -> None:
     assert one == other
 
 
-def test_normals_and_points_are_one_program(device: Device) -> None:
-    kinds: list[dict[str, Any]] = [
-        {"points": {"pattern": "grid", "count": 9}},
-        {"points": {"pattern": "stochastic", "count": 4}},
-        {"normal": "least_squares"},
-        {"normal": "one_triangle"},
-        {"normal": "eight_triangles_shading"},
-        {"normal": "eight_triangles_normal"},
-    ]
-    found = [texts(scene(FORMULA, renderer=each), device) for each in kinds]
-    assert all(each == found[0] for each in found)
-
-
 MARCHES: dict[str, dict[str, Any]] = {
     "rays": {},
     "point_rays": {"points": {"count": 4}},
@@ -277,25 +281,6 @@ def test_marches_are_stages(march: str, lanes: int, device: Device) -> None:
     )
     assert points == plain
     assert set(plain) & set(MARCHES) == {march}
-
-
-def test_points_of_the_search_by_steps_are_data(device: Device) -> None:
-    steps = {"search": "steps"}
-    found = [
-        texts(scene(FORMULA, renderer={**steps, **more}), device) for more in ({}, {"points": {"count": 4}})
-    ]
-    assert found[0]["steps"] == found[1]["steps"]
-
-
-POWERS = [1.5, *(2 + 0.5 * step for step in range(45)), 2.71, 8.001, 31.5, 32]
-
-
-def test_parameters_are_data(device: Device) -> None:
-    """Of programs that know the formula, too: whole powers, halves and others."""
-    extra: dict[str, Any] = {"coloring": {"by": "trap", "trap": {"shape": "sphere"}}, "glow": {"by": "trap"}}
-    found = [texts(scene({**FORMULA, "parameters": {"power": power}}, **extra), device) for power in POWERS]
-    assert len(POWERS) == 50
-    assert all(each == found[0] for each in found)
 
 
 def test_fifty_powers_need_one_compilation(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -51,11 +51,6 @@ class TestScenes:
         distance = dot(middle.center - middle.origin, middle.axis)
         assert distance / middle.width == pytest.approx(0.6 / 0.52)
 
-    def test_the_camera_stays_if_it_sees_as_wide_as_the_viewer(self) -> None:
-        fov = np.degrees(2 * np.arctan(0.52 * 54 / 96 / 2 / 0.6))
-        scene = scene_of(BALL, {**CAMERA, "fov": fov}, (96, 54), stereo={})
-        np.testing.assert_allclose(scene_view(scene).origin, CAMERA["position"], atol=1e-12)
-
     @pytest.mark.parametrize("mode", ["split_half", "over_under_half"])
     def test_squeezed_eyes_see_the_whole_screen(self, mode: str) -> None:
         whole = scene_of(BALL, CAMERA, (96, 54), stereo={"mode": "split"})
