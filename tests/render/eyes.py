@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -43,14 +44,16 @@ def filled(store: Framebuffer | JournalFramebuffer, planes: dict[str, np.ndarray
 
 
 def framebuffers(
-    scene: Stereo, image: tuple[int, int], region: Region | None, planes: tuple[dict[str, np.ndarray], ...]
+    scene: Stereo,
+    image: tuple[int, int],
+    region: Region | None,
+    planes: tuple[dict[str, np.ndarray], ...],
+    make: Callable[..., Any] = lambda side, size, part: Framebuffer(CHANNELS, size, part),
 ) -> tuple[Any, Any]:
     """What a region of the finished picture needs of each eye's; None where it needs nothing."""
-    whole = Region(0, 0, *picture_size(scene, image))
-    parts = eye_regions(scene, image, region or whole)
-    size = eye_size(scene, image)
+    parts = eye_regions(scene, image, region or Region(0, 0, *picture_size(scene, image)))
     left, right = (
-        part and filled(Framebuffer(CHANNELS, size, part), of)
-        for part, of in zip((parts["left"], parts["right"]), planes, strict=True)
+        part and filled(make(side, eye_size(scene, image), part), of)
+        for (side, part), of in zip(parts.items(), planes, strict=True)
     )
     return left, right

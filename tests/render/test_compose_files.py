@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,42 +14,33 @@ from PIL import Image
 from clfractal.errors import FileError
 from clfractal.files.exr import read_exr
 from clfractal.files.exr_header import read_scene_text
-from clfractal.images.compose import Composed, eye_regions
+from clfractal.images.compose import Composed
 from clfractal.images.formats import check_views
 from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.modes import eye_size
 from clfractal.images.outputs import pair_paths, save_outputs, save_views
 from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiles import Region
-from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, stereo
+from tests.render.eyes import CHANNELS, COMPOSED, eyes, filled, framebuffers, stereo
 
 
 @pytest.mark.parametrize("mode", COMPOSED)
 def test_files_from_disk_and_from_memory_are_the_same(tmp_path: Path, mode: str) -> None:
-    scene = stereo(mode)
-    image = (70, 90)
+    scene, image, region = stereo(mode), (70, 90), Region(5, 33, 60, 50)
     planes = eyes(eye_size(scene, image))
-    region = Region(5, 33, 60, 50)
-    parts = eye_regions(scene, image, region)
     header = {"scene": "version: 1\n", "version": "0.1.0"}
-    memory: list[Any] = []
-    disk: list[Any] = []
-    for side, of in zip(("left", "right"), planes, strict=True):
-        part = parts["left" if side == "left" else "right"]
-        if part is None:
-            memory.append(None)
-            disk.append(None)
-            continue
-        size = eye_size(scene, image)
-        memory.append(filled(Framebuffer(CHANNELS, size, part, header), of))
-        journal = JournalFramebuffer(tmp_path / f"{side}.partial", {}, CHANNELS, size, part, header)
-        disk.append(filled(journal, of))
-    for name, stores in (("memory", memory), ("disk", disk)):
-        composed = Composed(scene, image, stores[0], stores[1], region)
+    kinds: dict[str, Callable[..., Any]] = {
+        "memory": lambda side, size, part: Framebuffer(CHANNELS, size, part, header),
+        "disk": lambda side, size, part: JournalFramebuffer(
+            tmp_path / f"{side}.partial", {}, CHANNELS, size, part, header
+        ),
+    }
+    for name, make in kinds.items():
+        composed = Composed(scene, image, *framebuffers(scene, image, region, planes, make), region)
         save_outputs(composed, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
     for suffix in ("exr", "png"):
         assert (tmp_path / f"memory.{suffix}").read_bytes() == (tmp_path / f"disk.{suffix}").read_bytes()
-    whole = in_memory(Composed(scene, image, memory[0], memory[1], region))
+    whole = in_memory(composed)
     found, attributes = read_exr(tmp_path / "disk.exr")
     assert sorted(found) == sorted(whole.channels)
     assert np.array_equal(found["R"], whole["R"].astype(np.float16))
@@ -98,24 +89,28 @@ def test_both_views_in_one_file(tmp_path: Path) -> None:
     found, told = read_exr(tmp_path / "a.exr")
     expected = "R G B A Z N.left.X right.R right.G right.B right.A right.Z N.right.X"
     assert sorted(found) == sorted(expected.split())
-    for name in ("R", "Z"):
-        for stored, of in ((name, planes[0]), (f"right.{name}", planes[1])):
-            assert np.array_equal(found[stored], of[name].astype(found[stored].dtype))
-    assert np.array_equal(found["N.left.X"], planes[0]["N.X"].astype(np.float16))
-    assert np.array_equal(found["N.right.X"], planes[1]["N.X"].astype(np.float16))
-    assert found["right.Z"].dtype == np.float32
-    assert told["multiView"] == ("left", "right")
-    assert "view" not in told  # it would speak of a file of one view
-    assert told["dataWindow"] == (20, 10, 69, 49)
-    assert told["clfractalSeconds"] == 2
-    for number, views in enumerate([["", "left."], ["right."]]):
-        for view in views:
-            assert np.array_equal(told[view + "worldToCamera"], np.eye(4) + number)
-            assert np.array_equal(told[view + "worldToNDC"], np.eye(4) - number)
-    for number, view in enumerate(("left.", "right.")):
-        assert told[view + "clfractalDevices"] == f"1: 0:{number} device: 4 tiles"
-        assert told[view + "clfractalTileDevices"] == f"4*{number + 1}"
-    assert not {"clfractalDevices", "clfractalTileDevices"} & set(told)  # they would speak of one view
+    for stored, number, name in (
+        *(("R", 0, "R"), ("Z", 0, "Z"), ("N.left.X", 0, "N.X")),
+        *(("right.R", 1, "R"), ("right.Z", 1, "Z"), ("N.right.X", 1, "N.X")),
+    ):
+        assert np.array_equal(found[stored], planes[number][name].astype(found[stored].dtype))
+    assert {found[name].dtype for name in ("Z", "right.Z")} == {np.dtype(np.float32)}
+    wanted: dict[str, Any] = {
+        "multiView": ("left", "right"),
+        "dataWindow": (20, 10, 69, 49),
+        "clfractalSeconds": 2,
+        **{
+            f"{view}clfractalDevices": f"1: 0:{n} device: 4 tiles"
+            for n, view in enumerate(("left.", "right."))
+        },
+        **{f"{view}clfractalTileDevices": f"4*{n + 1}" for n, view in enumerate(("left.", "right."))},
+    }
+    assert {key: told[key] for key in wanted} == wanted
+    # They would speak of a file of one view.
+    assert not {"view", "clfractalDevices", "clfractalTileDevices"} & set(told)
+    for number, view in ((0, ""), (0, "left."), (1, "right.")):
+        assert np.array_equal(told[view + "worldToCamera"], np.eye(4) + number)
+        assert np.array_equal(told[view + "worldToNDC"], np.eye(4) - number)
     assert read_scene_text(tmp_path / "a.exr") == "version: 1\n"
 
 
@@ -126,15 +121,15 @@ def shifted(planes: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
 
 def test_views_that_cannot_be_written(tmp_path: Path) -> None:
     framebuffer = Framebuffer(CHANNELS, (8, 8))
-    message = r"a\.png: a PNG has room for one view; write both to an EXR"
-    with pytest.raises(FileError, match=message):
+    with pytest.raises(FileError, match=r"a\.png: a PNG has room for one view; write both to an EXR"):
         save_views(framebuffer, framebuffer, tmp_path / "a.png")
-    with pytest.raises(FileError, match=message):
-        check_views(tmp_path / "a.png")
-    with pytest.raises(FileError, match="a JPEG has room for one view"):
-        check_views(tmp_path / "a.jpg")
-    with pytest.raises(FileError, match="unknown extension"):
-        check_views(tmp_path / "a.gif")
+    for name, message in (
+        ("a.png", r"a\.png: a PNG has room for one view; write both to an EXR"),
+        ("a.jpg", "a JPEG has room for one view"),
+        ("a.gif", "unknown extension"),
+    ):
+        with pytest.raises(FileError, match=message):
+            check_views(tmp_path / name)
     with pytest.raises(ValueError, match="same size, region and channels"):
         save_views(framebuffer, Framebuffer(CHANNELS, (8, 9)), tmp_path / "a.exr")
     assert not list(tmp_path.iterdir())

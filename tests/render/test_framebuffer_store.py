@@ -127,16 +127,6 @@ def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.exr", "a.png"]
 
 
-def test_a_film_on_disk_gives_the_same_files(tmp_path: Path) -> None:
-    memory = Framebuffer(ALL, (150, 100), PART, HEADER)
-    disk = JournalFramebuffer(tmp_path / "a.partial", IDENTITY, ALL, (150, 100), PART, HEADER)
-    for store, name in ((memory, "memory"), (disk, "disk")):
-        fill(store)
-        save_outputs(store, [tmp_path / f"{name}.exr", tmp_path / f"{name}.png"])
-    for suffix in ("exr", "png"):
-        assert (tmp_path / f"memory.{suffix}").read_bytes() == (tmp_path / f"disk.{suffix}").read_bytes()
-
-
 def test_settings(tmp_path: Path) -> None:
     framebuffer = Framebuffer(("R", "G", "B", "A", "Z"), (40, 40))
     fill(framebuffer)

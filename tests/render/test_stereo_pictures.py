@@ -83,8 +83,8 @@ def test_an_eyes_picture_is_a_mono_one_through_its_view(
 @pytest.mark.parametrize("convergence", ["parallel", "toe_in", "off_axis"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_eyes_are_plain_cameras(device: Device, kind: str, convergence: str) -> None:
-    """A scene with a camera at the eye's place, as somebody writes it, shows the same. Of one that looks aside it is a part of
-    a wider picture: an eye three pixels of the plane beside its middle, with three more on each side."""
+    """A scene with a camera at the eye's place, as somebody writes it, shows the same. Of one that looks aside it is a part
+    of a wider picture: an eye three pixels of the plane beside its middle, with three more on each side."""
     scene, aside = stereo_scene(kind, convergence=convergence), convergence == "off_axis"
     for side, x in zip(SIDES, (-APART / 2, APART / 2), strict=True):
         camera = {

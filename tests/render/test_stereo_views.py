@@ -210,8 +210,8 @@ class TestParallax:
     def test_it_is_what_similar_triangles_say(
         self, setting: Setting, seed: int, convergence: str, separation: float
     ) -> None:
-        """e (1 - d / z) for a point at depth z and a plane at d: none on the plane, e at infinity; e less for eyes that look
-        straight on. None is vertical: both eyes' pictures show a point in one row."""
+        """e (1 - d / z) for a point at depth z and a plane at d: none on the plane, e at infinity; e less for eyes that
+        look straight on. None is vertical: both eyes' pictures show a point in one row."""
         changes = {"convergence": convergence, "separation": separation}
         views, stereo = setting.views(**changes), setting.section(**changes)
         middle = views["middle"]
