@@ -17,7 +17,7 @@ from clfractal.errors import SceneError
 from clfractal.files.resources import folder
 from clfractal.shading import scattering
 from tests.makers import maker
-from tests.render.lobes import Floats, hemisphere, material, numbers
+from tests.render.lobes import Floats, above, check_both_ways, check_samples, material, numbers, sampled
 from tests.render.material_kernel import NORMAL, ask, turned
 from tests.variants import one_of
 
@@ -25,6 +25,8 @@ pytestmark = pytest.mark.light
 
 ALONG = [1.0, 0.0, 0.0]  # of the surface of these tests
 GRID = [(r, a) for r in (0.35, 0.5, 0.75, 1.0) for a in (0.5, 0.9)]
+ONE, TWO = turned(above(200, 7, 0.1)), turned(above(200, 8, 0.1))
+
 BODIES: dict[str, dict[str, Any]] = {
     "metal": {"base": {"color": [1, 1, 1], "metalness": 1}},
     "gloss": {"base": {"color": [1, 1, 1]}},
@@ -43,65 +45,28 @@ def toward(cosine: float, angle: float) -> Floats:
     return turned(np.array([[sine * math.cos(angle), sine * math.sin(angle), cosine]]))
 
 
-def directions(count: int) -> Floats:
-    """By chance, over the surface, in its frame."""
-    found = np.random.default_rng(7).normal(size=(count, 3))
-    found[:, 2] = np.abs(found[:, 2]) + 0.1
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
 LIMITS = {"metal": 0.015, "gloss": 0.01, "glass": 0.012}
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("body", BODIES)
 def test_a_white_furnace_stays_white(body: str, precision: Any) -> None:
-    """Sampled: the mean of value over density is what is reflected in all."""
-    places = numbers(1 << 13)
-    for roughness, anisotropy in GRID:
-        for cosine, angle in ((0.2, 0.0), (0.2, 1.57), (0.6, 0.7), (1.0, 0.0)):
-            viewers = np.repeat(toward(cosine, angle), len(places), axis=0)
-            found = ask(
-                drawn(body, roughness, anisotropy), viewers, viewers, places, precision=precision, lanes=8
-            )
-            density = found.chosen_density[:, None]
-            weights = np.where(density > 0, found.chosen_value / np.maximum(density, 1e-30), 0.0)
-            assert np.abs(weights.mean(axis=0) - 1).max() < LIMITS[body], (
-                roughness,
-                anisotropy,
-                cosine,
-                angle,
-            )
+    for shape in GRID:
+        for way in ((0.2, 0.0), (0.2, 1.57), (0.6, 0.7), (1.0, 0.0)):
+            known = drawn(body, *shape)
+            sums = sampled(known, toward(*way), numbers(1 << 13), precision=precision, lanes=8)
+            assert np.abs(sums - 1).max() < LIMITS[body], (shape, way)
 
 
 @pytest.mark.parametrize("body", ["metal", "gloss"])
 def test_the_same_both_ways(body: str) -> None:
-    one, two = directions(400)[:200], directions(400)[200:]
-    there = ask(drawn(body, 0.6, 0.8), turned(one), turned(two), precision="float64").value
-    back = ask(drawn(body, 0.6, 0.8), turned(two), turned(one), precision="float64").value
-    assert np.allclose(there / two[:, 2:], back / one[:, 2:], rtol=1e-4)
+    check_both_ways(drawn(body, 0.6, 0.8))
 
 
-@pytest.mark.parametrize("body", ["metal", "gloss"])
+@pytest.mark.parametrize("body", BODIES)
 @pytest.mark.parametrize("angle", [0.0, 0.8, 1.57])
 def test_densities_are_those_of_samples(body: str, angle: float) -> None:
-    """In all, and in each of 16 parts of the hemisphere."""
-    lights, each = hemisphere()
-    places = numbers(1 << 15)
-    known, viewer = drawn(body, 0.5, 0.8), toward(0.6, angle)
-    density = ask(known, np.repeat(viewer, len(lights), axis=0), lights, precision="float64").density * each
-    tried = ask(known, np.repeat(viewer, len(places), axis=0), lights[:1], places)
-    usable = tried.chosen_density > 0
-    assert density.sum() == pytest.approx(usable.mean(), abs=0.003)
-
-    def part(of: Floats) -> Any:
-        side, up = of[:, 0], of @ np.cross(NORMAL, ALONG)
-        turn = np.floor((np.arctan2(up, side) / (2 * math.pi) % 1) * 8).astype(int)
-        return turn * 2 + (of @ NORMAL > 0.7)
-
-    expected = np.bincount(part(lights), density, 16)
-    found = np.bincount(part(tried.chosen[usable]), minlength=16) / len(places)
-    assert np.abs(found - expected).max() < 0.004
+    check_samples(drawn(body, 0.5, 0.8), toward(0.6, angle))
 
 
 _THEIRS = """
@@ -125,7 +90,7 @@ def test_values_agree_with_mitsuba(roughness: float, anisotropy: float) -> None:
     """Of facets that mirror all: a dielectric's boundary over Fresnel's reflectance, by widths of OpenPBR 1.1."""
     rest = 1 - anisotropy
     along = roughness**2 * math.sqrt(2 / (1 + rest * rest))
-    viewers, facets = directions(600)[:300], directions(600)[300:]
+    viewers, facets = above(300, 7, 0.1), above(300, 8, 0.1)
     facets = facets * [along, rest * along, 1.0] + [0.0, 0.0, 0.3]
     facets /= np.linalg.norm(facets, axis=1, keepdims=True)
     lights = 2 * (viewers * facets).sum(axis=1, keepdims=True) * facets - viewers
@@ -162,28 +127,23 @@ def test_values_agree_with_mitsuba(roughness: float, anisotropy: float) -> None:
 
 def test_even_highlights_are_what_they_were() -> None:
     """No bit differs, whatever the tangent is."""
-    one, two = turned(directions(400)[:200]), turned(directions(400)[200:])
     for body in BODIES:
-        without = ask(material({**BODIES[body], "specular": {"roughness": 0.4}}), one, two, lanes=8)
-        given = ask(drawn(body, 0.4, 0.0, [0.3, 0.2, -2.0]), one, two, lanes=8)
+        without = ask(material({**BODIES[body], "specular": {"roughness": 0.4}}), ONE, TWO, lanes=8)
+        given = ask(drawn(body, 0.4, 0.0, [0.3, 0.2, -2.0]), ONE, TWO, lanes=8)
         assert np.array_equal(without.value, given.value)
         assert np.array_equal(without.density, given.density)
 
 
 def test_the_tangent_is_laid_onto_the_surface() -> None:
-    one, two = turned(directions(400)[:200]), turned(directions(400)[200:])
-    flat = ask(drawn("metal", 0.4, 0.7, ALONG), one, two, precision="float64").value
-    steep = ask(drawn("metal", 0.4, 0.7, ALONG + 3 * NORMAL), one, two, precision="float64").value
-    across = ask(drawn("metal", 0.4, 0.7, np.cross(NORMAL, ALONG)), one, two, precision="float64").value
+    """One along the normal is some other."""
+    flat, steep, across, upright = (
+        ask(drawn("metal", 0.4, 0.7, tangent), ONE, TWO, precision="float64").value
+        for tangent in (ALONG, ALONG + 3 * NORMAL, np.cross(NORMAL, ALONG), NORMAL)
+    )
     assert np.allclose(steep, flat, rtol=1e-6)
     assert not np.allclose(across, flat, rtol=0.1)
-
-
-def test_a_tangent_along_the_normal_is_some_other() -> None:
-    one, two = turned(directions(400)[:200]), turned(directions(400)[200:])
-    found = ask(drawn("metal", 0.4, 0.7, NORMAL), one, two, precision="float64").value
-    assert np.isfinite(found).all()
-    assert found.min() > 0
+    assert np.isfinite(upright).all()
+    assert upright.min() > 0
     with pytest.raises(SceneError, match="must not be zero"):
         Specular.checked({"tangent": [0, 0, 0]})
 

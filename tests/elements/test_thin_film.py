@@ -9,9 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.scene.materials import PbrMaterial
-from tests.render.lobes import COSINES, numbers, toward
-from tests.render.material_kernel import Answers, ask, turned
+from tests.render.lobes import COSINES, material, numbers, sampled, toward
+from tests.render.material_kernel import ask, turned
 from tests.variants import one_of
 
 mitsuba = pytest.importorskip("mitsuba")
@@ -69,11 +68,6 @@ def airy(cosine: float, thickness: float, film: float, base: complex) -> Doubles
     return found @ weights()
 
 
-def material(parts: dict[str, Any]) -> PbrMaterial:
-    found: PbrMaterial = PbrMaterial.model_validate(parts)
-    return found
-
-
 def mirrored(parts: dict[str, Any], cosine: float, **options: Any) -> Doubles:
     """What a smooth material reflects of one direction, over what a mirror does."""
     sine = np.sqrt(1 - cosine * cosine)
@@ -102,11 +96,6 @@ def metal(index: complex, thickness: float, film: float) -> dict[str, Any]:
         "specular": {"color": [min(fresnel(index, 1 / 7) / schlick, 1)] * 3},
         "thin_film": {"weight": 1, "thickness": thickness, "ior": film},
     }
-
-
-def weighed(found: Answers) -> Doubles:
-    density = found.chosen_density[:, None]
-    return np.where(density > 0, found.chosen_value / np.maximum(density, 1e-30), 0.0)
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
@@ -140,27 +129,24 @@ def test_on_metals(index: complex) -> None:
 @pytest.mark.parametrize("name", FURNACES)
 def test_nothing_is_lost_or_made(name: str, thickness: float) -> None:
     """A film alone on a rough body changes with the angle more than its mean at three cosines tells at grazing ones."""
-    places = numbers(1 << 14)
     parts = {**FURNACES[name], "thin_film": {"weight": 1, "thickness": thickness, "ior": 1.7}}
     for inside in (False, True) if "transmission" in parts else (False,):
         for cosine in COSINES:
-            viewers = np.repeat(toward(cosine), len(places), axis=0)
-            found = weighed(ask(material(parts), viewers, viewers, places, inside=inside)).mean(axis=0)
+            found = sampled(material(parts), toward(cosine), numbers(1 << 14), inside=inside)
             most = 0.07 if name == "no boundary" and cosine < 0.2 else 0.01
             assert np.abs(found - 1).max() < most, (inside, cosine, found)
 
 
 def test_no_film_is_none() -> None:
     """No weight, and no thickness, leave every bit."""
-    places = numbers(1 << 10)
-    viewers = np.repeat(toward(0.6), len(places), axis=0)
     for parts in FURNACES.values():
-        plain = ask(material(parts), viewers, viewers, places)
-        for film in ({"weight": 0}, {"weight": 1, "thickness": 0}):
-            found = ask(material({**parts, "thin_film": film}), viewers, viewers, places)
-            assert (found.chosen_value == plain.chosen_value).all()
-            assert (found.chosen_density == plain.chosen_density).all()
-            assert (found.value == plain.value).all()
+        plain, *others = (
+            ask(material({**parts, **film}), toward(0.6), toward(0.6), numbers(1 << 10))
+            for film in ({}, {"thin_film": {"weight": 0}}, {"thin_film": {"weight": 1, "thickness": 0}})
+        )
+        for found in others:
+            for name in ("chosen_value", "chosen_density", "value"):
+                assert (getattr(found, name) == getattr(plain, name)).all()
 
 
 def test_a_film_thinner_than_light_does_nothing_and_a_thick_one_has_no_colour() -> None:

@@ -107,7 +107,8 @@ def ask(
     inside: bool = False,
     leans: Floats | None = None,
 ) -> Answers:
-    """Runs the kernel on world directions, shape (n, 3) each, and numbers in (0, 1), shape (n, 3), or (n, 4) with a relief.
+    """Runs the kernel on world directions, shape (n, 3) or (1, 3) each, and numbers in (0, 1), shape (n, 3), or (n, 4) with
+    a relief.
 
     The normal is on the viewer's side, also where the viewer is `inside` glass; `leans`: that of a relief.
     """
@@ -115,7 +116,7 @@ def ask(
     glass = not isinstance(weight, float) or weight > 0
     tables = np.concatenate([albedo_tables(), glass_tables()]) if glass else albedo_tables()
     kernels = _kernels(choose(), precision, lanes)
-    given = max(len(viewer), len(light))
+    given = max(len(viewer), len(light), 0 if numbers is None else len(numbers))
     columns = np.full((10, given), 0.5)
     columns[0:3] = viewer.T
     columns[3:6] = light.T

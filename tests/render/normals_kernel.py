@@ -9,10 +9,30 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
 from tests.devices import device
+from tests.render.normals_oracle import grid_offsets
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
 Masks = npt.NDArray[np.bool_]
+
+GRID = grid_offsets(3)
+PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
+
+
+def lanes_of(precision: Precision) -> int:
+    return accepted_lanes(device(), precision)[-1]
+
+
+def epsilon(precision: Precision) -> float:
+    return float(np.finfo(precision).eps)
+
+
+@cache
+def variants() -> list[tuple[Precision, int]]:
+    """Every number type and lane count."""
+    return [(each, lanes) for each in PRECISIONS for lanes in accepted_lanes(device(), each)]
+
 
 _TEXT = """\
 #include "device/lanes.h"

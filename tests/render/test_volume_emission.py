@@ -9,15 +9,11 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.scene.load import load_scene
 from clfractal.shading.transfer import MOST_OPACITY
-from tests.render.shots import Floats, rays, shoot, stacked
-from tests.render.volumes import keep, to_box
+from tests.render.media import CAMERA, CORNER, SIDES, VOXEL, keep_media, light_of
+from tests.render.shots import Floats, rays
+from tests.render.volumes import to_box, volume_scene
 
-SIDE, VOXELS = 2.0, 20
-VOXEL = SIDE / VOXELS
-CORNER = np.full(3, -SIDE / 2)
-CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
 DARK: dict[str, Any] = {
     "material": {"color": [0, 0, 0], "specular": 0},
     "lights": [],
@@ -28,39 +24,22 @@ LIGHT = np.array([0.03, 0.2, 0.006])
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cube in which all voxels are 1."""
-    path = tmp_path_factory.mktemp("cube")
-    keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), CORNER, [VOXEL] * 3)
-    return path
+    return keep_media(tmp_path_factory.mktemp("cube"))
 
 
 def shown(
     folder: Path, device: Device, opacity: float, step: float, **sections: Any
 ) -> tuple[Floats, Floats]:
     """The picture's light, and how long rays are in the cube, in voxels."""
-    scene = load_scene(
-        {
-            "version": 1,
-            "formula": {"name": "mandelbulb"},
-            "image": {"width": 24, "height": 24},
-            "camera": CAMERA,
-            "renderer": {
-                "type": "volume",
-                "file": "cube.nrrd",
-                "step": step,
-                "opacity_limit": 1,
-                "transfer": {
-                    "opacity": [{"at": 0.5, "opacity": opacity}],
-                    "emission": [{"at": 0.5, "emission": LIGHT.tolist()}],
-                },
-            },
-            **DARK,
-            **sections,
-        },
-        folder=folder,
-    )
-    near, far = to_box(*rays(scene)[:2], CORNER, np.full(3, SIDE))
-    return stacked(shoot(scene, device), "RGB").astype(float), np.maximum(far - near, 0) / VOXEL
+    transfer = {
+        "opacity": [{"at": 0.5, "opacity": opacity}],
+        "emission": [{"at": 0.5, "emission": LIGHT.tolist()}],
+    }
+    settings: dict[str, Any] = {"step": step, "opacity_limit": 1, "transfer": transfer}
+    look = {**DARK, **sections}
+    scene = volume_scene(CAMERA, folder=folder, size=(24, 24), look=look, file="cube.nrrd", **settings)
+    near, far = to_box(*rays(scene)[:2], CORNER, SIDES)
+    return light_of(scene, device), np.maximum(far - near, 0) / VOXEL
 
 
 @pytest.mark.parametrize("opacity", [0.0, 0.02, 0.3, 1.0])

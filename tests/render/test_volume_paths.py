@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal.integrators.volume
@@ -19,42 +18,37 @@ from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
 from tests.environment_maps import write_map
-from tests.render.shots import Floats, rays, shoot, stacked
-from tests.render.volumes import in_voxels, keep, middles, to_box, value_at
+from tests.render.media import (
+    CAMERA,
+    CORNER,
+    OBLIQUE,
+    OPACITY,
+    SIDE,
+    SIDES,
+    SIGMA,
+    VOXEL,
+    VOXELS,
+    WHITE,
+    assert_alike,
+    keep_media,
+    light_of,
+    optical_depth,
+    phase,
+    waves,
+)
+from tests.render.shots import Floats, rays, shoot
+from tests.render.volumes import to_box
 from tests.scenes import scene_of
 
 pytestmark = pytest.mark.light
 
-SIDE, VOXELS = 2.0, 20
-VOXEL = SIDE / VOXELS
-CORNER, SIDES = np.full(3, -SIDE / 2), np.full(3, SIDE)
-CAMERA = {"position": [1.6, -4.2, 1.3], "fov": 40}
 COLOR = np.array([0.9, 0.6, 0.2])
-# Steps of a grid that is turned, oblique and left-handed.
-OBLIQUE = VOXEL * np.array([[0.9, 0.4, 0.1], [0.5, -0.8, 0.2], [0.1, 0.3, 1.0]])
-OPACITY = 0.12
-SIGMA = -np.log(1 - OPACITY) / VOXEL  # per scene unit
 SUN = np.array([-0.5, 0.6, -0.8]) / np.linalg.norm([-0.5, 0.6, -0.8])
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A cube in which all voxels are 1, one whose values grow and fall, and a ball."""
-    path = tmp_path_factory.mktemp("media")
-    spacing = [VOXEL] * 3
-    keep(path / "cube.nrrd", np.ones((VOXELS,) * 3, np.float32), CORNER, spacing)
-    keep(path / "waves.nrrd", waves(), CORNER, spacing)
-    keep(path / "oblique.nrrd", waves(), -OBLIQUE.sum(0) * VOXELS / 2, OBLIQUE)
-    distance = np.linalg.norm(middles((VOXELS,) * 3, CORNER, spacing), axis=-1)
-    keep(path / "ball.nrrd", (distance < 0.85).astype(np.float32), CORNER, spacing)
-    return path
-
-
-def waves() -> Floats:
-    """From 0 to 1 and back within a brick."""
-    places = middles((VOXELS,) * 3, CORNER, [VOXEL] * 3)
-    found: Floats = np.clip(np.sin(7 * places[..., 0]) * np.cos(5 * places[..., 2] + places[..., 1]), 0, 1)
-    return found.astype(np.float32)
+    return keep_media(tmp_path_factory.mktemp("media"))
 
 
 def medium(
@@ -84,10 +78,6 @@ def medium(
     return scene_of(size=(24, 24), folder=folder, **{**usual, **given})
 
 
-def light_of(scene: Scene, device: Device, **settings: Any) -> Floats:
-    return stacked(shoot(scene, device, **settings), "RGB").astype(float)
-
-
 def within(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     """Each pixel's ray: its origin, direction, and where it enters and leaves the cube."""
     origin, direction, _ = rays(scene)
@@ -95,49 +85,28 @@ def within(scene: Scene) -> tuple[Floats, Floats, Floats, Floats]:
     return origin, direction, near, np.maximum(far, near)
 
 
-def assert_alike(
-    light: npt.NDArray[Any], expected: npt.NDArray[Any], error: float, share: float = 0.01
-) -> None:
-    """In all within a hundredth; each pixel within five standard errors of one whose value is about 1."""
-    assert light.mean() == pytest.approx(expected.mean(), rel=share)
-    assert np.abs(light - expected).max() < 5 * error
-
-
-WHITE: dict[str, Any] = {"background": {"top": [1, 1, 1], "bottom": [1, 1, 1]}}
 BLACK: dict[str, Any] = {"transfer": {"color": [{"at": 0, "color": [0, 0, 0]}]}}
 
 
-def test_what_comes_through(device: Device, folder: Path) -> None:
-    """exp(-sigma L) of a white sky behind a black medium; alpha is the rest."""
-    scene = medium(folder, samples=1024, **BLACK, **WHITE)
-    _, _, near, far = within(scene)
-    expected = np.exp(-SIGMA * (far - near))
-    framebuffer = shoot(scene, device)
-    assert expected.min() < 0.2
-    assert_alike(framebuffer["R"], expected, 0.5 / 32)
-    np.testing.assert_allclose(framebuffer["A"], 1 - framebuffer["R"], atol=1e-5)
-
-
-@pytest.mark.parametrize(("file", "steps"), [("waves.nrrd", VOXEL * np.eye(3)), ("oblique.nrrd", OBLIQUE)])
-def test_bounds_may_be_loose(device: Device, folder: Path, file: str, steps: Floats) -> None:
-    """Where the density goes up and down within a brick, its integral decides, by NumPy; in an oblique grid, too."""
+@pytest.mark.parametrize(
+    ("file", "values", "steps"),
+    [
+        ("cube.nrrd", np.ones((VOXELS,) * 3), VOXEL * np.eye(3)),
+        ("waves.nrrd", waves(), VOXEL * np.eye(3)),
+        ("oblique.nrrd", waves(), OBLIQUE),
+    ],
+    ids=["cube", "waves", "oblique"],
+)
+def test_what_comes_through(device: Device, folder: Path, file: str, values: Floats, steps: Floats) -> None:
+    """exp(-depth) of a white sky behind a black medium; alpha is the rest. Where the density goes up and down within a brick,
+    its integral decides, by NumPy; in an oblique grid, too."""
     scene = medium(folder, file=file, samples=1024, **BLACK, **WHITE)
     origin, direction, _ = rays(scene)
-    first, way = in_voxels(origin + steps.sum(0) * VOXELS / 2, steps), in_voxels(direction, steps)
-    near, far = to_box(first, way, np.zeros(3), np.full(3, float(VOXELS)))
-    long = np.maximum(far - near, 0)
-    shortest = np.linalg.norm(steps, axis=1).min()
-    depth = np.zeros(near.shape)
-    for part in (np.arange(1500) + 0.5) / 1500:
-        value = value_at(waves(), np.nan_to_num(first + (near + part * long)[..., None] * way))
-        depth += -np.log(1 - OPACITY * value) / shortest * long / 1500
-    assert_alike(light_of(scene, device)[..., 0], np.exp(-depth), 0.5 / 32)
-
-
-def phase(cosine: Floats, g: float) -> Floats:
-    """Henyey and Greenstein's."""
-    found: Floats = (1 - g * g) / (4 * np.pi * (1 + g * g - 2 * g * cosine) ** 1.5)
-    return found
+    depth = optical_depth(values, -steps.sum(0) * VOXELS / 2, steps, origin, direction)
+    framebuffer = shoot(scene, device)
+    assert np.exp(-depth).min() < 0.6
+    assert_alike(framebuffer["R"], np.exp(-depth), 1024)
+    np.testing.assert_allclose(framebuffer["A"], 1 - framebuffer["R"], atol=1e-5)
 
 
 def from_sun(points: Floats) -> tuple[Floats, Floats]:
