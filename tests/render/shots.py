@@ -139,17 +139,6 @@ def shoot_whole(scene: Scene, device: Device, **settings: Any) -> Framebuffer:
     return engine_of(device).render(scene, **{"precision": "float32", "channels": CHANNELS, **settings})
 
 
-def repeated(scene: Scene, device: Device, names: Sequence[str]) -> tuple[Framebuffer, Framebuffer]:
-    """A picture that its passes and a region repeat bit by bit, and the same by single lanes."""
-    whole = shoot(scene, device, channels=names)
-    *_, last = engine_of(device).refine(scene, channels=names)
-    part = shoot(scene, device, channels=names, region=(8, 12, 20, 16))
-    for name in names:
-        np.testing.assert_array_equal(last[name], whole[name])
-        np.testing.assert_array_equal(part[name], whole[name][12:28, 8:28])
-    return whole, shoot(scene, device, channels=names, lanes=1)
-
-
 def engine_of(device: Device) -> Engine:
     """An engine that all tests share."""
     return _engines.setdefault(device, Engine(device))

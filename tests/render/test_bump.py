@@ -17,7 +17,7 @@ from clfractal.integrators.points import distances
 from clfractal.scene.load import dump_scene
 from tests.devices import check_usable
 from tests.render.color_maps import BULB, ramp
-from tests.render.path_scenes import path, seen
+from tests.render.path_scenes import seen
 from tests.render.reliefs import EYE, Floats, displaced, facts, relief, unit
 from tests.render.shots import degrees
 from tests.variants import one_of
@@ -238,40 +238,6 @@ def test_parts_of_a_blend_share_their_reliefs() -> None:
 # -- light
 
 
-FURNACES: dict[str, dict[str, Any]] = {
-    "clay": {"base": {"color": [1, 1, 1], "diffuse_roughness": 0.4}, "specular": {"weight": 0}},
-    "metal": {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0.4}},
-    "lacquer": {
-        "base": {"color": [1, 1, 1]},
-        "coat": {"weight": 1, "roughness": 0.1},
-        "fuzz": {"weight": 0.3},
-    },
-}
-
-
-@pytest.mark.parametrize("name", one_of(*FURNACES))
-def test_white_before_white_is_not_seen(name: str) -> None:
-    """A steep relief on a convex body loses no light, and makes none."""
-    steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.3], [1, 0]]}
-    material = {**FURNACES[name], "bump": {"height": steep}}
-    scene = relief(0, materials={"m": material}, lighting=path(2), renderer={"samples": 1})
-    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
-
-
-@pytest.mark.combination
-def test_glass_before_white_is_not_seen() -> None:
-    steep = {"by": "height", "range": [0, 0.5], "repeat": True, "curve": [[0, 0], [0.5, 0.1], [1, 0]]}
-    glass = {
-        "transmission": {"weight": 1},
-        "specular": {"roughness": 0.2, "ior": 1.4},
-        "bump": {"height": steep, "width": 0.05},
-    }
-    scene = relief(
-        0, materials={"m": glass}, lighting=path(64, roulette=64), renderer={"samples": 1, "search": "steps"}
-    )
-    assert abs(seen(scene, 64)[0].mean() - 1) < 0.015
-
-
 def test_what_is_lit_is_brighter() -> None:
     """A light from above: slopes up to it are lighter than the ball, slopes down darker; none is lit below the horizon."""
     light: dict[str, Any] = {
@@ -297,16 +263,6 @@ def test_a_flat_relief_changes_nothing() -> None:
     assert np.array_equal(plain, seen(relief({"by": "normal", "curve": [[0, 2], [1, 2]]}), 4)[0] * 1.0)
 
 
-@pytest.mark.combination
-def test_geometry_stays() -> None:
-    """Channels N and P are the surface's."""
-    plain, bumped = facts(relief(0)), facts(relief(TRAP))
-    assert np.array_equal(plain["N"], bumped["N"])
-    assert np.array_equal(plain["P"], bumped["P"])
-    assert np.array_equal(plain["normal"], plain["N"])
-    assert not np.allclose(bumped["normal"], bumped["N"], atol=0.05)
-
-
 def test_normals_face_the_viewer() -> None:
     steep = {"by": "height", "range": [0, 0.4], "repeat": True, "curve": [[0, 0], [0.5, 2], [1, 0]]}
     found = facts(relief(steep))
@@ -314,22 +270,6 @@ def test_normals_face_the_viewer() -> None:
     faces = (found["N"] * unit(EYE - found["P"])).sum(axis=-1) > 0
     assert ((found["normal"] * unit(EYE - found["P"])).sum(axis=-1) > 0)[faces].all()
     assert np.allclose(np.linalg.norm(found["normal"], axis=-1), 1, atol=1e-5)
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("lanes", [4, 8, 16])
-def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_usable("float32", lanes)
-    pictures = []
-    for each in (1, lanes):
-        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
-        framebuffer = clfractal.render(
-            relief({"by": "normal", "curve": [[0, 0], [1, 0.2]]}, width=0.05, lighting=path(1), **BULB),
-            channels=("R", "normal.X"),
-        )
-        pictures.append(np.stack([np.asarray(framebuffer[name]) for name in ("R", "normal.X")]))
-    assert np.ptp(pictures[0][1]) > 1
-    assert np.abs(pictures[0] - pictures[1]).mean() < 1e-3
 
 
 @pytest.mark.combination
@@ -408,19 +348,6 @@ objects: {b: {material: m}}
         match=r"objects\.b\.material: 'm' differs from place to place, which needs lighting\.mode: path",
     ):
         clfractal.load_scene(text)
-
-
-def test_reliefs_move_in_films() -> None:
-    tracks = {
-        "materials.m.bump.height.curve.1.1": {"keys": [{"time": 0, "value": 0.1}, {"time": 1, "value": 0.5}]},
-        "materials.m.bump.width": {"keys": [{"time": 0, "value": 0.1}, {"time": 1, "value": 0.3}]},
-    }
-    scene = relief(TRAP, width=0.1, animation={"frames": 3, "fps": 2, "tracks": tracks})
-    from clfractal.scene.movement import Movement
-
-    middle = Movement(scene).scene(1).materials["m"].bump
-    assert middle.width == pytest.approx(0.2, abs=0.05)
-    assert middle.height.curve[1][1] == pytest.approx(0.3, abs=0.05)
 
 
 def test_a_scene_with_a_relief_is_written_and_read() -> None:

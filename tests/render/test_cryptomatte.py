@@ -23,7 +23,7 @@ from clfractal.integrators.state import state_numbers
 from clfractal.integrators.surface import program_texts
 from clfractal.shading.cryptomatte import bits_of, identifier, murmur3, ranked
 from tests.render.path_scenes import path, scene_of
-from tests.render.shots import plan_of, repeated
+from tests.render.shots import plan_of
 from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
@@ -100,14 +100,6 @@ def grid() -> list[tuple[float, float]]:
     """10,000 places of the box, as the eye sees it."""
     steps = (np.arange(100) + 0.5) / 100 - 0.5
     return [(0.2 + 0.6 * x, -1.2 + 0.4 * z) for x in steps for z in steps]
-
-
-@pytest.mark.combination
-def test_they_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
-    scene, names = scene_of(**SECTIONS, lighting=path(1)), [*ID_CHANNELS]
-    whole, single = repeated(scene, device, names)
-    for name in names:
-        assert np.mean(single[name] != whole[name]) < 0.02
 
 
 def test_adaptive_pixels_have_all_of_their_coverage() -> None:

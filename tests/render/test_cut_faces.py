@@ -11,11 +11,9 @@ from clfractal.device.select import Device
 from clfractal.formulas import reference
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
-from tests.devices import check_usable
 from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
-from tests.variants import one_of
 
 ALBEDO = ("albedo.R", "albedo.G", "albedo.B")
 CHANNELS = (*(name for name in EVERY if name not in ("steps", "samples")), "object", *ALBEDO)
@@ -179,17 +177,3 @@ def test_a_white_cut_model_in_a_white_sky_is_white(device: Device) -> None:
     # At the edge of a cut few hits face away from the eye, as at any rim.
     assert abs(framebuffer["G"].mean() - 1) < 1e-3
     assert (abs(framebuffer["G"] - 1) > 0.01).mean() < 0.01
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("mode", MODES)
-@pytest.mark.parametrize("precision", one_of("float32", "float64"))
-def test_packets_and_single_lanes_see_the_same(device: Device, mode: str, precision: Any) -> None:
-    check_usable(precision)
-    scene = scene_of(**MODES[mode], lights=[{"direction": [0.2, 1, -1]}])
-    framebuffers = [framebuffer_of(scene, device, precision=precision, lanes=lanes) for lanes in (1, 4, 8)]
-    found, _, _ = met_by_eye(scene)
-    for other in framebuffers[1:]:
-        for name in CHANNELS:
-            near = np.isclose(framebuffers[0][name], other[name], atol=1e-4, equal_nan=True)
-            assert (near | ~found.sure).mean() > 0.998, name

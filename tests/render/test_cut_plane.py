@@ -12,13 +12,12 @@ import clfractal
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
-from clfractal.images.tiles import TileGrid
 from clfractal.integrators.cut_plane import renderer_of
 from clfractal.integrators.plan import choose_precision
 from clfractal.scene.palette import named_table
 from clfractal.scene.rectangle import moved
 from tests.render.planes import SMOOTH_RADIUS, Floats, mandelbrot, picture_of, pixel_points, plane_scene, sure
-from tests.render.shots import plan_of, render_tile, shoot, stacked
+from tests.render.shots import shoot, stacked
 
 STEPPED, SMOOTH = {"mode": "stepped"}, {"mode": "smooth"}
 # Around the whole set; a piece of the seahorse valley, 10^-8 wide, where counts are high.
@@ -137,24 +136,6 @@ class TestChannels:
         assert (np.diff(framebuffer["P.X"], axis=1) > 0).all()
         assert (np.diff(framebuffer["P.Z"], axis=0) < 0).all()
         assert np.abs(framebuffer["P.Y"]).max() == 0
-
-    def test_a_part_a_tile_and_the_whole_have_the_same_bits(self, device: Device) -> None:
-        scene = plane_scene(size=(80, 70), plane=WHOLE, colors=STEPPED, samples=4)
-        whole = stacked(shoot(scene, device))
-        part = stacked(shoot(scene, device, region=(13, 21, 50, 37)))
-        assert whole[21:58, 13:63].tobytes() == part.tobytes()
-        plan = plan_of(scene, device)
-        tile = TileGrid(plan.region).tile(4)
-        alone = render_tile(scene, plan, device, tile)
-        cut = whole[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
-        assert np.moveaxis(alone, 0, -1).tobytes() == cut.tobytes()
-
-    def test_lanes_do_not_matter(self, device: Device) -> None:
-        precision: Precision = "float64" if has_float64(device.info) else "float32"
-        scene = plane_scene(size=(40, 40), plane=WHOLE, colors=STEPPED)
-        single = stacked(shoot(scene, device, precision, lanes=1), ("iterations", "steps"))
-        packets = stacked(shoot(scene, device, precision), ("iterations", "steps"))
-        assert (packets == single).all(axis=-1).mean() > (0.999 if precision == "float64" else 0.9)
 
 
 def palette_by_numpy(palette: str, place: Floats, *, repeat: bool) -> Floats:

@@ -252,17 +252,6 @@ def test_the_eye_and_mirrors_see_the_whole_of_it(device: Device) -> None:
     )
 
 
-@pytest.mark.combination
-def test_lanes_and_number_types_agree(device: Device) -> None:
-    scene = among_many(GLOW, 4)
-    packets = colors(scene, device)
-    single = colors(scene, device, lanes=1)
-    assert (np.abs(packets - single) < 1e-3).mean() > 0.99
-    double = colors(scene, device, precision="float64", lanes=1)
-    assert (np.abs(single - double) < 1e-2).mean() > 0.97
-    assert double.mean() == pytest.approx(single.mean(), rel=0.02)
-
-
 def test_what_is_asked_for() -> None:
     blend = {"blend": ["glow", "white"], "mask": 0.5}
     materials = {

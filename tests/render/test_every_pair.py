@@ -12,15 +12,17 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clfractal.device.select import Device
+from clfractal.device.structs import Precision
 from clfractal.engine import drawing
 from clfractal.files.channels import ID_CHANNELS, SURFACE_LAYERS
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
+from tests.devices import check_usable
 from tests.features import APART, CUT_PLANE, OF_MEDIA, SURFACE, VOLUME, Values, put_together
 from tests.gpu.pairs import covering
 from tests.portability.pictures import FOLDER
-from tests.render.shots import CHANNELS, plan_of, render_planned, shoot
+from tests.render.shots import CHANNELS, plan_of, render_planned, shoot, stacked
 
 SIZE = (44, 26)  # two tiles, neither of them whole
 PLAIN: dict[str, Any] = {
@@ -129,6 +131,44 @@ def test_random_scenes(device: Device, data: st.DataObject) -> None:
     more = data.draw(st.fixed_dictionaries({}, optional=SECTIONS), "more")
     with pytest.MonkeyPatch.context() as patch:
         holds("surface", chosen, device, patch, more)
+
+
+MILK = {"milk": {"transmission": {"weight": 1, "depth": 0.3, "scatter": [0.9, 0.8, 0.7]}}}
+# Each feature alone, and one that has no pair.
+ALONE = [
+    (kind, name, value)
+    for kind, each in FEATURES.items()
+    for name, values in each.items()
+    for value in values
+]
+VARIANTS = [("float32", 1), ("float32", 4), ("float32", 8), ("float32", 16), ("float64", 1), ("float64", 4)]
+
+
+@pytest.mark.combination
+@pytest.mark.parametrize(("precision", "lanes"), VARIANTS)
+@pytest.mark.parametrize(("kind", "feature", "value"), [*ALONE, ("surface", "lighting", "milk")])
+def test_lanes_and_number_types_show_the_same(
+    kind: str, feature: str, value: str, precision: Precision, lanes: int, device: Device
+) -> None:
+    """Packets of another width are another program, whose last bits differ, and with them what decides at a rim, or which
+    way a path goes."""
+    check_usable(precision, lanes)
+    points = "grid" if value == "residual" else ""
+    chosen = {"formula": "mandelbulb", **({"points": points} if points else {}), feature: value}
+    asked = of(kind, {} if value == "milk" else chosen)
+    if value == "milk":
+        asked |= {**FORMULAS["mandelbulb"], "materials": MILK, "material": {"name": "milk"}}
+        asked |= {"lighting": {"mode": "path"}}
+    scene, names = read(asked), [name for name in channels(chosen) if name != "steps"]
+    usual, other = (
+        stacked(shoot(scene, device, channels=names, **way), names)
+        for way in ({}, {"precision": precision, "lanes": lanes})
+    )
+    by_chance = "lighting" in asked or "noise" in feature or scene.environment is not None
+    same = np.isclose(usual, other, rtol=1e-3, atol=1e-3).all(axis=-1)
+    assert same.mean() > (0.6 if by_chance else 0.9)
+    colors = [names.index(name) for name in "RGB"]
+    assert usual[..., colors].mean() == pytest.approx(other[..., colors].mean(), rel=0.05, abs=1e-3)
 
 
 def holds(

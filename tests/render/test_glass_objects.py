@@ -13,8 +13,9 @@ from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS, NOISY
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
-from tests.render.glass_scenes import BODIES, Floats, colors_of, glass, scene
-from tests.render.path_scenes import BALL, path, scene_of
+from clfractal.scene.model import Scene
+from tests.render.glass_scenes import BODIES, FAR_OFF, Floats, colors_of, glass, scene
+from tests.render.path_scenes import BALL, GREY, path, scene_of
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -32,46 +33,16 @@ def plain_scene(objects: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-@pytest.mark.parametrize(
-    ("body", "roughness"),
-    one_of(("box", 0.5), ("sphere", 0), ("cylinder", 0), ("box", 0), ("sphere", 0.5), ("cylinder", 0.5)),
-)
-def test_glass_before_white_is_not_seen(body: str, roughness: float) -> None:
-    samples = 256 if roughness else 16
-    body_of_glass = {**BODIES[body], "material": "glass"}
-    colors = colors_of(scene({"body": body_of_glass}, {"glass": glass(roughness)}), samples)
-    assert abs(colors.mean() - 1) < 0.005
-
-
-@pytest.mark.combination
-def test_glass_in_glass_before_white_is_not_seen() -> None:
-    """Whichever is the denser, and whether it is an object or the set; and where three stand in each other."""
-    materials = {"box": glass(0.2, 1.3), "ball": glass(0, 1.6), "set": glass(0.1, 1.2)}
-    eye = {"position": [1, -5, 1.5], "fov": 32}
-    objects = {
-        "box": {"type": "box", "size": [3, 3, 3], "position": [0, -44, 0], "material": "box"},
-        "ball": {
-            "type": "sphere",
-            "radius": 0.9,
-            "position": [0.9, -44.6, 0],
-            "material": "ball",
-        },
-    }
-    found = scene(objects, materials, camera=eye, material={"name": "set"}, bounces=64)
-    assert abs(colors_of(found, 16).mean() - 1) < 0.01
-
-
-def test_a_white_ground_under_water_before_white_is_not_seen() -> None:
-    """From above the waves and from below."""
-    objects = {
-        "ground": {"type": "plane", "position": [0, 0, -1.5], "material": "white"},
-        "lake": {"type": "water", "waves": {"height": 0.1, "length": 1.5}, "material": "lake"},
-    }
-    materials = {"white": {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}, "lake": glass(0, 1.33)}
-    for height in (2, -0.8):
-        camera = {"position": [0, 40, height], "target": [0, 44, -1], "fov": 30}
-        colors = colors_of(scene(objects, materials, camera=camera, bounces=64), 16)
-        assert abs(colors.mean() - 1) < 0.01
+def joined_glass(objects: dict[str, Any], material: dict[str, Any], **sections: Any) -> Scene:
+    return scene_of(
+        objects=objects,
+        materials={"glass": material},
+        material={"name": "glass"},
+        lighting=path(64),
+        image={"width": 96, "height": 96},
+        background=GREY,
+        **sections,
+    )
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
@@ -233,3 +204,24 @@ def test_a_light_without_shadows_is_no_brighter_in_water_that_absorbs() -> None:
     clear, deep = seen([1, 1, 1]), seen([0.3, 0.3, 0.3])
     assert clear > 0.02
     assert deep < 0.6 * clear
+
+
+@pytest.mark.combination
+def test_what_is_left_of_a_set_is_as_an_object_of_that_shape() -> None:
+    """A ball of which only a box is left is a box of glass: the same light comes through it, dimmed by the same ways."""
+    clear = glass(0, 1.4, color=[0.7, 0.4, 0.2], depth=0.5)
+    box = {**BODIES["box"], "size": [1, 0.8, 0.6]}
+    camera = {"position": [0, -4, 0], "target": [0, 0, 0], "fov": 24}
+    left = colors_of(joined_glass({"box": {**box, "join": "intersection"}}, clear, camera=camera), 24)
+    beside = scene(
+        {"box": {**box, "material": "glass"}},
+        {"glass": clear},
+        camera={"position": [0, 40, 0], "target": [0, 44, 0], "fov": 24},
+        bounces=64,
+    ).model_copy(update={"image": joined_glass({}, clear).image})
+    whole: Floats = colors_of(beside, 24)
+    assert FAR_OFF["position"] == [0, 40, 0]
+    np.testing.assert_allclose(left.mean(axis=(0, 1)), whole.mean(axis=(0, 1)), rtol=0.01)
+    # The edges of a set are a footprint wide: at a quarter of this size of picture it is 8 %, at twice it 2 %.
+    middle = (slice(34, 62), slice(34, 62))
+    np.testing.assert_allclose(left[middle].mean(axis=(0, 1)), whole[middle].mean(axis=(0, 1)), rtol=0.05)

@@ -10,11 +10,9 @@ import pytest
 import yaml
 
 import clfractal
-from clfractal.device.select import choose
 from clfractal.errors import SceneError
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
-from tests.portability.pictures import picture
 from tests.render.glass_scenes import ball
 from tests.render.path_scenes import BALL, path, scene_of, seen
 from tests.variants import one_of
@@ -22,30 +20,6 @@ from tests.variants import one_of
 pytestmark = pytest.mark.light
 
 Floats = npt.NDArray[np.float64]
-
-
-@pytest.mark.parametrize(("roughness", "weight"), [(0, 0.5), (0.3, 1), (0.7, 0.5), (1, 1)])
-def test_glass_before_white_is_not_seen(roughness: float, weight: float) -> None:
-    colors = seen(ball(roughness, transmission={"weight": weight}), 16)[0]
-    assert abs(colors.mean() - 1) < 0.01
-
-
-@pytest.mark.parametrize(
-    "formula",
-    [
-        {"name": "mandelbulb", "iterations": 4},
-        {"name": "menger_sponge", "iterations": 2},
-        {"name": "hast", "iterations": 12},
-    ],
-)
-@pytest.mark.parametrize("search", one_of("steps", "distance"))
-def test_sets_of_glass_keep_light(formula: dict[str, Any], search: str) -> None:
-    """However rough the set and whichever way its surface is found; hast is dust where pixels are as wide as here."""
-    scene = ball(0.1, bounces=64, formula=formula, camera={"position": [1.4, -2.6, 1.1], "fov": 40})
-    renderer = scene.surface.model_copy(update={"search": search})
-    colors = seen(scene.model_copy(update={"renderer": renderer}), 16)[0]
-    assert len(colors) > 100
-    assert abs(colors.mean() - 1) < (0.03 if formula["name"] == "hast" else 0.01)
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
@@ -102,17 +76,6 @@ def test_a_sun_shines_through_rough_glass() -> None:
     assert colors.mean() > 0.05
     smooth = scene_of(background=dark, lights=[{"direction": [0, -1, 0]}], lighting=path(8))
     assert seen(smooth, 4)[0].mean() < 0.01
-
-
-@pytest.mark.combination
-def test_lanes_do_not_matter() -> None:
-    """Paths are noise that small differences stir: the mean of a packet's picture is that of a lane's."""
-    device = choose()
-    one = picture(device, "glass", "float32", (32, 24), lanes=1)
-    packet = picture(device, "glass", "float32", (32, 24), lanes=8)
-    same = np.isclose(one, packet, rtol=1e-3, atol=1e-4)
-    assert same.mean() > 0.8
-    assert abs(one[:3].mean() - packet[:3].mean()) < 0.01 * one[:3].mean()
 
 
 def test_scenes_without_glass_do_not_know_it() -> None:

@@ -100,18 +100,6 @@ def test_glow_is_the_integral(device: Device, case: str) -> None:
     np.testing.assert_allclose(seen[inner], wanted[inner], rtol=0.06, atol=0.02 * wanted[inner].max())
 
 
-@pytest.mark.combination
-def test_steps_do_not_show(device: Device) -> None:
-    """The same light with one and with many lanes, the same bits each time; in another number type but for noise."""
-    scene = glowing(64)
-    one = shoot(scene, device, lanes=1)["R"].astype(float)
-    many = shoot(scene, device, lanes=8)["R"].astype(float)
-    np.testing.assert_allclose(one, many, rtol=1e-4, atol=1e-5)
-    assert np.array_equal(many, shoot(scene, device, lanes=8)["R"])
-    exact = shoot(scene, device, precision="float64", lanes=1)["R"].astype(float)
-    assert abs(exact.mean() / one.mean() - 1) < 0.01
-
-
 def test_a_mirror_shows_glow(device: Device) -> None:
     """Rays that leave a ball gather as much as those that arrive. (Close up, where they begin near the surface.)"""
     close = {"position": [1.5, -2.5, 1.2], "target": [0, 0, 0], "fov": 0.5}

@@ -18,7 +18,7 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.passes import kept_numbers
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import BLACK, path, scene_of
-from tests.render.shots import plan_of, repeated, shoot
+from tests.render.shots import plan_of, shoot
 from tests.variants import one_of
 
 Floats = npt.NDArray[np.float64]
@@ -104,21 +104,6 @@ def test_a_plane_in_front_dims_the_layers_like_the_picture() -> None:
         assert np.allclose(layer(framebuffer, name)[:, 26:], 0.4 * layer(clear, name)[:, 26:], atol=1e-5)
 
 
-def test_layers_change_no_bit_of_the_picture() -> None:
-    framebuffer = rendered(GLOWING, background=SKY)
-    scene = scene_of(
-        materials={"m": GLOWING},
-        material={"name": "m"},
-        lighting=path(3),
-        lights=[SUN],
-        background=SKY,
-        renderer={"samples": 8},
-    )
-    plain = clfractal.render(scene, channels=RAY_CHANNELS)
-    for name in RAY_CHANNELS:
-        np.testing.assert_array_equal(framebuffer[name], plain[name])
-
-
 def test_emission_is_what_the_material_shines_with() -> None:
     framebuffer = rendered(GLOWING, background=BLACK, lights=[])
     full = framebuffer["A"] == 1
@@ -186,23 +171,6 @@ def test_a_lamp_that_is_seen_is_emission_and_white() -> None:
     assert np.allclose(layer(framebuffer, "emission")[middle], 3, rtol=1e-5)
     assert np.allclose(layer(framebuffer, "albedo")[middle], 1)
     assert not layer(framebuffer, "direct")[middle].any()
-
-
-@pytest.mark.combination
-def test_layers_do_not_depend_on_passes_lanes_or_regions(device: Device) -> None:
-    names = [*SURFACE_LAYERS]
-    scene = scene_of(
-        materials={"m": GLOWING},
-        material={"name": "m"},
-        lighting=path(3),
-        lights=[SUN],
-        background=SKY,
-        renderer={"samples": 8},
-    )
-    whole, single = repeated(scene, device, names)
-    for name in names:
-        # Compilers round differently for packets.
-        assert np.mean(np.abs(single[name] - whole[name]) > 1e-3) < 0.01
 
 
 @pytest.mark.parametrize(

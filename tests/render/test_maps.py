@@ -134,22 +134,6 @@ def test_the_formula_is_asked() -> None:
 
 
 @pytest.mark.combination
-@pytest.mark.parametrize("lanes", [4, 1, 8, 16])
-def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_usable("float32", lanes)
-    emission = {
-        "luminance": {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]},
-        "color": {"by": "normal", "palette": RAMP},
-    }
-    pictures = []
-    for each in (1, lanes):
-        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
-        pictures.append(np.asarray(clfractal.render(shining(emission, **BULB), channels=("R",))["R"]))
-    assert pictures[0].max() > 0.1
-    assert np.abs(pictures[0] - pictures[1]).mean() < 2e-4
-
-
-@pytest.mark.combination
 def test_two_questions_have_their_own_answers() -> None:
     """Two traps in one material: the picture is the product of the pictures of each."""
     one = {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]}
@@ -193,36 +177,6 @@ def test_a_mask_mixes_what_its_parts_shine() -> None:
     share = np.clip(facts["normal"][:, 2] / 0.5, 0, 1)
     assert np.abs(colors[:, 0] - 2 * (1 - share)).max() < 0.02
     assert np.abs(colors[:, 2] - 4 * share).max() < 0.04
-
-
-FURNACES: dict[str, dict[str, Any]] = {
-    "roughness": {
-        "base": {"color": [1, 1, 1], "metalness": {"by": "height", "range": [-1, 1]}},
-        "specular": {"roughness": {"by": "normal", "curve": [[0, 0.1], [1, 0.9]]}},
-    },
-    "layers": {
-        "base": {"color": [1, 1, 1], "diffuse_roughness": {"by": "normal"}},
-        "coat": {"weight": {"by": "height", "range": [-1, 1]}, "roughness": {"by": "normal"}},
-        "specular": {"ior": {"by": "normal", "curve": [[0, 1], [1, 2]]}},
-    },
-}
-
-
-@pytest.mark.parametrize("name", FURNACES)
-def test_white_before_white_is_not_seen(name: str) -> None:
-    scene = scene_of(
-        background=GREY, materials={"m": FURNACES[name]}, material={"name": "m"}, lighting=path(2)
-    )
-    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
-
-
-def test_a_blend_of_white_materials_is_white() -> None:
-    materials = {
-        **FURNACES,
-        "m": {"blend": ["roughness", "layers"], "mask": {"by": "normal", "range": [-0.5, 0.5]}},
-    }
-    scene = scene_of(background=GREY, materials=materials, material={"name": "m"}, lighting=path(2))
-    assert abs(seen(scene, 64)[0].mean() - 1) < 0.01
 
 
 # -- pictures

@@ -1,31 +1,20 @@
 """Light along paths beside Mitsuba 3, which renders the same ball, pillar and floor in a process of its own.
 
 All three are a set, or the ball alone is one, and the others are objects beside it.
-
-Regions of the pictures are compared: they may differ by the standard errors of both, found from
-several pictures with other seeds, times the factor that Bonferroni's correction asks for, and by 1 % for what a surface's
-footprint is wide.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
-from functools import cache
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
 import pytest
 
-import clfractal
+from tests.render.mitsuba import assert_alike, by_mitsuba, by_us
+from tests.variants import combinations
 
 pytestmark = pytest.mark.light
-
-Floats = npt.NDArray[np.float64]
 
 WIDTH, HEIGHT, SAMPLES, SEEDS = 48, 32, 96, 6
 ACROSS, DOWN = 6, 4  # regions
@@ -91,36 +80,6 @@ KINDS: dict[str, dict[str, Any]] = {
         },
     },
 }
-_THEIRS = """
-import json, sys
-import mitsuba as mi
-import numpy as np
-mi.set_variant("scalar_rgb")
-from mitsuba import ScalarTransform4f as T
-told = json.load(sys.stdin)
-body = told["material"]
-for light in told["lights"]:
-    if "to_world" in light:
-        origin, target, up = light["to_world"]["look_at"]
-        light["to_world"] = T().look_at(origin=origin, target=target, up=up) @ T().scale(light["to_world"]["scale"])
-scene = mi.load_dict({
-    "type": "scene",
-    "integrator": {"type": "path", "max_depth": told["bounces"] + 2, "rr_depth": 1000},
-    "sensor": {
-        "type": "perspective", "fov": told["fov"], "fov_axis": "y",
-        "to_world": T().look_at(origin=told["eye"], target=told["target"], up=[0, 0, 1]),
-        "film": {"type": "hdrfilm", "width": told["size"][0], "height": told["size"][1], "rfilter": {"type": "box"}},
-        "sampler": {"type": "independent", "sample_count": told["samples"]},
-    },
-    "ball": {"type": "sphere", "radius": 0.5, "bsdf": body},
-    "pillar": {"type": "cube", "to_world": T().translate([-0.95, -0.35, 0.05]) @ T().scale([0.2, 0.2, 0.55]), "bsdf": body},
-    "floor": {"type": "disk", "to_world": T().translate([0, 0, -0.5]) @ T().scale([4, 4, 4]), "bsdf": body},
-    **{f"light{number}": light for number, light in enumerate(told["lights"])},
-})
-pictures = [np.array(mi.render(scene, seed=1 + seed))[..., :3] for seed in range(told["seeds"])]
-np.save(told["to"], np.stack(pictures))
-"""
-
 MATERIALS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "lambert": (
         {"base": {"color": COLOR}, "specular": {"weight": 0}},
@@ -222,58 +181,19 @@ GLOWS: dict[str, dict[str, Any]] = {
 }
 
 
-def theirs(material: str, lights: str, folder: Path) -> Floats:
-    """Pictures by Mitsuba, one of each seed, shape (SEEDS, HEIGHT, WIDTH, 3)."""
-    told = {
-        "material": MATERIALS[material][1],
-        "lights": LIGHTS[lights][1],
-        "bounces": BOUNCES,
-        "fov": FOV,
-        "eye": EYE,
-        "target": TARGET,
-        "size": [WIDTH, HEIGHT],
-        "samples": SAMPLES,
-        "seeds": SEEDS,
-        "to": str(folder / "theirs.npy"),
-    }
-    subprocess.run(
-        [sys.executable, "-c", _THEIRS], input=json.dumps(told), text=True, check=True, timeout=300
-    )
-    return np.asarray(np.load(folder / "theirs.npy"), np.float64)
-
-
-def ours(kind: str, material: str, lights: str) -> Floats:
-    """The same by paths."""
-    pictures, given, shown = [], KINDS[kind], LIGHTS[lights][0]
-    for seed in range(SEEDS):
-        scene = clfractal.Scene(
-            version=1,
-            **{**given, **shown, "objects": {**given.get("objects", {}), **shown.get("objects", {})}},
-            camera={"position": EYE, "target": TARGET, "fov": FOV},
-            image={"width": WIDTH, "height": HEIGHT},
-            # A tenth of the footprint: at contacts light would be missing.
-            renderer={"samples": SAMPLES, "detail": 0.1, "seed": seed},
-            lighting={"mode": "path", "bounces": BOUNCES, "roulette": BOUNCES},
-            materials={"m": MATERIALS[material][0], **GLOWS[lights]},
-            material={"name": "m"},
-        )
-        film = clfractal.render(scene)
-        pictures.append(np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64))
-    return np.stack(pictures)
-
-
-def regions(pictures: Floats) -> Floats:
-    """Means of regions, shape (SEEDS, DOWN, ACROSS, 3)."""
-    shape = (len(pictures), DOWN, HEIGHT // DOWN, ACROSS, WIDTH // ACROSS, 3)
-    return np.asarray(pictures.reshape(shape).mean(axis=(2, 4)))
-
-
-@cache
-def factor() -> float:
-    """Standard errors that a difference may be, so that one of all regions fails in a thousand runs."""
-    from scipy.stats import t
-
-    return float(t.ppf(1 - 0.001 / 2 / (DOWN * ACROSS * 3), 2 * SEEDS - 2))
+_THEIRS = """
+body = told["material"]
+for light in told["lights"]:
+    if "to_world" in light:
+        origin, target, up = light["to_world"]["look_at"]
+        light["to_world"] = T().look_at(origin=origin, target=target, up=up) @ T().scale(light["to_world"]["scale"])
+found = pictures({
+    "ball": {"type": "sphere", "radius": 0.5, "bsdf": body},
+    "pillar": {"type": "cube", "to_world": T().translate([-0.95, -0.35, 0.05]) @ T().scale([0.2, 0.2, 0.55]), "bsdf": body},
+    "floor": {"type": "disk", "to_world": T().translate([0, 0, -0.5]) @ T().scale([4, 4, 4]), "bsdf": body},
+    **{f"light{number}": light for number, light in enumerate(told["lights"])},
+})
+"""
 
 
 # (Lamps that metals throw on metals are caustics, which neither finds in so few samples.)
@@ -281,18 +201,42 @@ def factor() -> float:
     ("kind", "material", "lights"),
     [
         ("set", "lambert", "sky"),
-        pytest.param("set", "lambert", "lamps", marks=pytest.mark.combination),
-        pytest.param("set", "metal", "sky", marks=pytest.mark.combination),
-        pytest.param("objects", "lambert", "sky", marks=pytest.mark.combination),
-        pytest.param("objects", "lambert", "sizes", marks=pytest.mark.combination),
         ("objects", "lambert", "glowing"),
-        pytest.param("objects", "metal", "sky", marks=pytest.mark.combination),
+        *combinations(
+            [
+                ("set", "lambert", "lamps"),
+                ("set", "metal", "sky"),
+                ("objects", "lambert", "sky"),
+                ("objects", "lambert", "sizes"),
+                ("objects", "metal", "sky"),
+            ]
+        ),
     ],
 )
 def test_pictures_agree_with_mitsuba(kind: str, material: str, lights: str, tmp_path: Path) -> None:
-    one, other = regions(ours(kind, material, lights)), regions(theirs(material, lights, tmp_path))
-    error = np.sqrt((one.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)) / SEEDS)
-    difference, scale = one.mean(axis=0) - other.mean(axis=0), other.mean(axis=0)
-    assert scale.max() > 0.1
-    assert (np.abs(difference) <= 0.01 * scale + factor() * error + 1e-4).all()
-    assert abs(difference.mean() / scale.mean()) < 0.005
+    (ours, theirs), (shown, lamps) = MATERIALS[material], LIGHTS[lights]
+    view = {"eye": EYE, "target": TARGET, "fov": FOV, "size": [WIDTH, HEIGHT]}
+    told = {
+        **view,
+        "bounces": BOUNCES,
+        "samples": SAMPLES,
+        "seeds": SEEDS,
+        "material": theirs,
+        "lights": lamps,
+    }
+    found = by_us(
+        SEEDS,
+        # A tenth of the footprint: at contacts light would be missing.
+        {"samples": SAMPLES, "detail": 0.1},
+        **{
+            **KINDS[kind],
+            **shown,
+            "objects": {**KINDS[kind].get("objects", {}), **shown.get("objects", {})},
+        },
+        camera={"position": EYE, "target": TARGET, "fov": FOV},
+        image={"width": WIDTH, "height": HEIGHT},
+        lighting={"mode": "path", "bounces": BOUNCES, "roulette": BOUNCES},
+        materials={"m": ours, **GLOWS[lights]},
+        material={"name": "m"},
+    )
+    assert assert_alike(found, by_mitsuba(_THEIRS, told, tmp_path), DOWN, ACROSS).max() > 0.1

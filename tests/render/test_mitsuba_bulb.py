@@ -13,42 +13,16 @@ import numpy.typing as npt
 import pytest
 
 import clfractal
+from tests.render.mitsuba import Floats, by_mitsuba
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 Way = list[float] | None
 
 SIDE, ALBEDO, BOUNCES = 128, 0.8, 6
 EYE, TARGET, FOV = [1.25, -2.05, 0.85], [0, 0, -0.02], 56
 SUN: Way = [0.3, 0.5, -0.8]
 FORMULA = {"name": "mandelbulb", "iterations": 5}
-_THEIRS = """
-import json, sys
-import mitsuba as mi
-import numpy as np
-mi.set_variant("scalar_rgb")
-told = json.load(sys.stdin)
-white = {"type": "diffuse", "reflectance": {"type": "rgb", "value": told["albedo"]}}
-scene = mi.load_dict({
-    "type": "scene",
-    "integrator": {"type": "path", "max_depth": told["bounces"] + 2, "rr_depth": 1000},
-    "sensor": {
-        "type": "perspective", "fov": told["fov"], "fov_axis": "y",
-        "to_world": mi.ScalarTransform4f().look_at(origin=told["eye"], target=told["target"], up=[0, 0, 1]),
-        "film": {"type": "hdrfilm", "width": told["side"], "height": told["side"], "rfilter": {"type": "box"}},
-        "sampler": {"type": "independent", "sample_count": 16},
-    },
-    "set": {"type": "ply", "filename": told["mesh"], "face_normals": True, "bsdf": {"type": "twosided", "sided": white}},
-    "light": (
-        {"type": "constant", "radiance": {"type": "rgb", "value": 1}}
-        if told["sun"] is None
-        # A white surface that faces our light is as bright as the light is intense: that takes pi times the irradiance.
-        else {"type": "directional", "direction": told["sun"], "irradiance": {"type": "rgb", "value": np.pi}}
-    ),
-})
-np.save(told["to"], np.array(mi.render(scene, seed=1))[..., 1])
-"""
 
 
 def drawn(
@@ -87,52 +61,36 @@ def meshed(folder: Path) -> Path:
     return mesh
 
 
-def theirs(mesh: Path, sun: Way) -> Floats:
-    """Mitsuba's picture of the mesh."""
-    picture = mesh.with_suffix(".npy")
-    told = {
-        "albedo": ALBEDO,
-        "bounces": BOUNCES,
-        "fov": FOV,
-        "eye": EYE,
-        "target": TARGET,
-        "side": SIDE,
-        "sun": sun,
-        "mesh": str(mesh),
-        "to": str(picture),
+_THEIRS = """
+white = {"type": "diffuse", "reflectance": {"type": "rgb", "value": told["albedo"]}}
+light = {"type": "constant", "radiance": {"type": "rgb", "value": 1}}
+if told["sun"] is not None:
+    # A white surface that faces our light is as bright as the light is intense: that takes pi times the irradiance.
+    light = {"type": "directional", "direction": told["sun"], "irradiance": {"type": "rgb", "value": np.pi}}
+body = {"type": "ply", "filename": told["mesh"], "face_normals": True, "bsdf": {"type": "twosided", "sided": white}}
+found = pictures({"set": body, "light": light})[0, ..., 1]
+"""
+
+
+@pytest.fixture(scope="module")
+def theirs(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Floats]:
+    """Mitsuba's pictures of the mesh, under a white sky and in the sun."""
+    folder = tmp_path_factory.mktemp("bulb")
+    view = {"eye": EYE, "target": TARGET, "fov": FOV, "size": [SIDE, SIDE], "samples": 16}
+    told = {**view, "albedo": ALBEDO, "bounces": BOUNCES, "mesh": str(meshed(folder))}
+    return {
+        name: by_mitsuba(_THEIRS, {**told, "sun": sun}, folder) for name, sun in (("sky", None), ("sun", SUN))
     }
-    subprocess.run(
-        [sys.executable, "-c", _THEIRS], input=json.dumps(told), text=True, check=True, timeout=300
-    )
-    return np.asarray(np.load(picture), np.float64)
-
-
-@pytest.fixture(scope="module")
-def mesh(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return meshed(tmp_path_factory.mktemp("bulb"))
-
-
-@pytest.fixture(scope="module")
-def under_sky(mesh: Path) -> Floats:
-    return theirs(mesh, None)
-
-
-@pytest.fixture(scope="module")
-def under_sun(mesh: Path) -> Floats:
-    return theirs(mesh, SUN)
 
 
 @pytest.mark.parametrize(("side", "samples"), [(128, 64), (512, 4)])
-def test_the_bulb_is_as_bright_as_its_mesh(side: int, samples: int, under_sky: Floats) -> None:
-    light, covered = drawn(side, samples)
+@pytest.mark.parametrize(("light", "sun"), [("sky", None), ("sun", SUN)])
+def test_the_bulb_is_as_bright_as_its_mesh(
+    light: str, sun: Way, side: int, samples: int, theirs: dict[str, Floats]
+) -> None:
+    found, covered = drawn(side, samples, sun)
     assert covered.mean() > 0.4
-    assert light[covered].mean() == pytest.approx(under_sky[covered].mean(), rel=0.03)
-
-
-@pytest.mark.parametrize(("side", "samples"), [(128, 64), (512, 4)])
-def test_by_a_lamp_too(side: int, samples: int, under_sun: Floats) -> None:
-    light, covered = drawn(side, samples, SUN)
-    assert light[covered].mean() == pytest.approx(under_sun[covered].mean(), rel=0.03)
+    assert found[covered].mean() == pytest.approx(theirs[light][covered].mean(), rel=0.03)
 
 
 @pytest.mark.parametrize(
@@ -147,10 +105,10 @@ def test_the_bulb_is_as_bright_as_its_equation(sun: Way, expected: float) -> Non
     assert light[covered].mean() == pytest.approx(expected, rel=0.03)
 
 
-def test_its_old_look_was_not(under_sky: Floats) -> None:
+def test_its_old_look_was_not(theirs: dict[str, Floats]) -> None:
     """Rays that leave the surface three pixels above it never see what is between its bumps."""
     light, covered = drawn(128, 16, detail=1)
-    assert light[covered].mean() > 1.1 * under_sky[covered].mean()
+    assert light[covered].mean() > 1.1 * theirs["sky"][covered].mean()
 
 
 @pytest.mark.parametrize("sun", [[0, 1, 0], [1, -0.5, 0.2]], ids=["before", "behind"])

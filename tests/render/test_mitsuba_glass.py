@@ -1,28 +1,23 @@
 """A ball of glass beside Mitsuba 3: clear, rough, of media that absorb and scatter; and with another ball in it.
 
 The ball fills the picture. It stands under a sky whose colour changes with the height, so that light which is bent the
-wrong way has the wrong colour. Regions are compared as in `test_mitsuba.py`.
+wrong way has the wrong colour.
 """
 
 from __future__ import annotations
 
-import json
 import math
-import subprocess
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
-import clfractal
+from tests.render.mitsuba import assert_alike, by_mitsuba, by_us
+from tests.variants import one_of
 
 pytestmark = pytest.mark.light
-
-Floats = npt.NDArray[np.float64]
 
 SIZE, SAMPLES, SEEDS, REGIONS = 32, 48, 6, 4
 EYE, FOV = [1.0, -3.6, 1.4], 17.0
@@ -32,12 +27,6 @@ FAR_OFF = [0.0, 60.0, 0.0]
 INDEX, ALPHA = 1.5, 0.06
 COLOR, DEPTH = [0.9, 0.7, 0.5], 1.5
 _THEIRS = """
-import json, sys
-import mitsuba as mi
-import numpy as np
-mi.set_variant("scalar_rgb")
-from mitsuba import ScalarTransform4f as T
-told = json.load(sys.stdin)
 height = np.cos(np.pi * (np.arange(256) + 0.5) / 256)[:, None, None]
 top, bottom = np.array(told["top"]), np.array(told["bottom"])
 sky = np.broadcast_to(top + (bottom - top) * (0.5 - 0.5 * height), (256, 512, 3)).astype(np.float32).copy()
@@ -56,19 +45,8 @@ if told["around"]:
     outer = {"type": "sphere", "radius": 2.0, "bsdf": told["around"], "interior": medium(told["around_medium"])}
     bodies["outer"] = outer
     ball["exterior"] = medium(told["around_medium"])
-scene = mi.load_dict({
-    "type": "scene",
-    "integrator": {"type": told["integrator"], "max_depth": told["bounces"] + 2, "rr_depth": 1000},
-    "sensor": {
-        "type": "perspective", "fov": told["fov"], "fov_axis": "y",
-        "to_world": T().look_at(origin=told["eye"], target=[0, 0, 0], up=[0, 0, 1]),
-        "film": {"type": "hdrfilm", "width": told["size"], "height": told["size"], "rfilter": {"type": "box"}},
-        "sampler": {"type": "independent", "sample_count": told["samples"]},
-    },
-    **bodies,
-    "sky": {"type": "envmap", "bitmap": mi.Bitmap(sky), "to_world": T().rotate([1, 0, 0], 90)},
-})
-np.save(told["to"], np.stack([np.array(mi.render(scene, seed=1 + seed))[..., :3] for seed in range(told["seeds"])]))
+sky = {"type": "envmap", "bitmap": mi.Bitmap(sky), "to_world": T().rotate([1, 0, 0], 90)}
+found = pictures({**bodies, "sky": sky})
 """
 
 
@@ -138,91 +116,51 @@ CLOUDY = {"milk", "rose"}
 AROUND = dict.fromkeys(("drop", "core"), BALLS["amber"])
 
 
-def fov_of(ball: str) -> float:
-    """That the bodies fill the picture."""
-    return 35.0 if ball in AROUND else FOV
-
-
-def theirs(ball: str, folder: Path) -> Floats:
-    """Pictures by Mitsuba, one of each seed, shape (SEEDS, SIZE, SIZE, 3)."""
+# (The others are kinds of the core.)
+@pytest.mark.parametrize("ball", one_of("core", *(name for name in BALLS if name != "core")))
+def test_balls_of_glass_agree_with_mitsuba(ball: str, tmp_path: Path) -> None:
+    ours, theirs, medium = BALLS[ball]
+    around = AROUND.get(ball, ({}, None, None))
+    middle = FAR_OFF if ball in OBJECTS else [0.0, 0.0, 0.0]
+    bodies = {
+        **({"outer": {"type": "sphere", "radius": 2.0, "material": "around"}} if ball in AROUND else {}),
+        **(
+            {"ball": {"type": "sphere", "radius": 1.0, "position": middle, "material": "m"}}
+            if ball in OBJECTS
+            else {}
+        ),
+    }
+    # So that the bodies fill the picture.
+    fov = 35.0 if ball in AROUND else FOV
+    bounces = CLOUDY_BOUNCES if ball in CLOUDY else BOUNCES
     told = {
-        "material": BALLS[ball][1],
-        "medium": BALLS[ball][2],
-        "integrator": "volpathmis" if ball in CLOUDY else "volpath",
-        "around": AROUND[ball][1] if ball in AROUND else None,
-        "around_medium": AROUND[ball][2] if ball in AROUND else None,
+        "eye": EYE,
+        "target": [0, 0, 0],
+        "fov": fov,
+        "size": [SIZE, SIZE],
+        "samples": SAMPLES,
+        "seeds": SEEDS,
         "top": TOP,
         "bottom": BOTTOM,
         "bounces": 1000 if ball in CLOUDY else BOUNCES,
-        "fov": fov_of(ball),
-        "eye": EYE,
-        "size": SIZE,
-        "samples": SAMPLES,
-        "seeds": SEEDS,
-        "to": str(folder / "theirs.npy"),
+        "integrator": "volpathmis" if ball in CLOUDY else "volpath",
+        "material": theirs,
+        "medium": medium,
+        "around": around[1],
+        "around_medium": around[2],
     }
-    subprocess.run(
-        [sys.executable, "-c", _THEIRS], input=json.dumps(told), text=True, check=True, timeout=300
+    found = by_us(
+        SEEDS,
+        {"samples": SAMPLES, "detail": 0.02},
+        formula={"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]},
+        camera={"position": np.add(EYE, middle).tolist(), "target": middle, "fov": fov},
+        image={"width": SIZE, "height": SIZE},
+        lighting={"mode": "path", "bounces": bounces, "roulette": bounces},
+        background={"top": TOP, "bottom": BOTTOM},
+        lights=[],
+        materials={"m": ours, "around": around[0], "set": {}},
+        objects=bodies,
+        material={"name": "set" if ball in OBJECTS else "m"},
     )
-    return np.asarray(np.load(folder / "theirs.npy"), np.float64)
-
-
-def ours(ball: str) -> Floats:
-    """The same by paths."""
-    pictures = []
-    objects: dict[str, Any] = {}
-    if ball in AROUND:
-        objects = {"outer": {"type": "sphere", "radius": 2.0, "material": "around"}}
-    middle = FAR_OFF if ball in OBJECTS else [0.0, 0.0, 0.0]
-    if ball in OBJECTS:
-        objects = {"ball": {"type": "sphere", "radius": 1.0, "position": middle, "material": "m"}}
-    bounces = CLOUDY_BOUNCES if ball in CLOUDY else BOUNCES
-    for seed in range(SEEDS):
-        scene = clfractal.Scene(
-            version=1,
-            formula={"name": "quaternion_julia", "iterations": 12, "julia": [0, 0, 0, 0]},
-            camera={
-                "position": np.add(EYE, middle).tolist(),
-                "target": middle,
-                "fov": fov_of(ball),
-            },
-            image={"width": SIZE, "height": SIZE},
-            renderer={"samples": SAMPLES, "detail": 0.02, "seed": seed},
-            lighting={"mode": "path", "bounces": bounces, "roulette": bounces},
-            background={"top": TOP, "bottom": BOTTOM},
-            lights=[],
-            materials={"m": BALLS[ball][0], "around": AROUND[ball][0] if ball in AROUND else {}, "set": {}},
-            objects=objects,
-            material={"name": "set" if ball in OBJECTS else "m"},
-        )
-        film = clfractal.render(scene)
-        pictures.append(np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64))
-    return np.stack(pictures)
-
-
-def regions(pictures: Floats) -> Floats:
-    """Means of regions, shape (SEEDS, REGIONS, REGIONS, 3)."""
-    each = SIZE // REGIONS
-    return np.asarray(pictures.reshape(len(pictures), REGIONS, each, REGIONS, each, 3).mean(axis=(2, 4)))
-
-
-# The others are kinds of these.
-KINDS = ("core",)
-
-
-@pytest.mark.parametrize(
-    "ball",
-    [*KINDS, *(pytest.param(name, marks=pytest.mark.combination) for name in BALLS if name not in KINDS)],
-)
-def test_balls_of_glass_agree_with_mitsuba(ball: str, tmp_path: Path) -> None:
-    from scipy.stats import t
-
-    # One of all regions fails in a thousand runs.
-    factor = float(t.ppf(1 - 0.001 / 2 / (REGIONS * REGIONS * 3), 2 * SEEDS - 2))
-    one, other = regions(ours(ball)), regions(theirs(ball, tmp_path))
-    error = np.sqrt((one.var(axis=0, ddof=1) + other.var(axis=0, ddof=1)) / SEEDS)
-    difference, scale = one.mean(axis=0) - other.mean(axis=0), other.mean(axis=0)
-    assert scale.max() > 0.3
-    assert scale.max() / scale.min() > 1.8
-    assert (np.abs(difference) <= 0.01 * scale + factor * error + 1e-4).all()
-    assert abs(difference.mean() / scale.mean()) < 0.005
+    light = assert_alike(found, by_mitsuba(_THEIRS, told, tmp_path), REGIONS, REGIONS)
+    assert light.max() > max(0.3, 1.8 * light.min())

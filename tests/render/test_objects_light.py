@@ -252,32 +252,6 @@ def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
     np.testing.assert_allclose(colors(framebuffer), (1 - 0.5**8) / 0.5, rtol=2e-3)
 
 
-def test_white_objects_under_a_white_sky_are_white(device: Device) -> None:
-    white = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 1, "roughness": 0.4}}
-    scene = scene_of(
-        NOWHERE,
-        FROM_ABOVE,
-        (24, 24),
-        objects={
-            "floor": {**FLOOR, "material": "white"},
-            "ball": {**BALL_OBJECT, "material": "white"},
-            "box": {
-                "type": "box",
-                "size": [0.4, 0.4, 1],
-                "position": [-0.8, 0.4, 0],
-                "rotation": [0, 0, 30],
-                "material": "white",
-            },
-        },
-        materials={"white": white},
-        lights=[],
-        lighting={"mode": "path", "bounces": 32, "roulette": 64},
-        renderer={"samples": 32},
-        background=[1, 1, 1],
-    )
-    assert colors(shoot(scene, device)).mean() == pytest.approx(1, abs=0.01)
-
-
 @pytest.mark.parametrize(
     ("name", "material"),
     [

@@ -12,10 +12,9 @@ import pytest
 import clfractal
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
-from tests.devices import check_usable
-from tests.render.glass_scenes import BODIES, ball, colors_of, glass, scene
+from tests.render.glass_scenes import BODIES, colors_of, glass, scene
 from tests.render.half_space import depth_function
-from tests.render.path_scenes import BLACK, path, scene_of, seen
+from tests.render.path_scenes import BLACK, path, scene_of
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -28,46 +27,6 @@ E = float(np.exp(-1))
 def milk(ior: float = 1.5, roughness: float = 0, **transmission: Any) -> dict[str, Any]:
     """A medium that absorbs nothing, unless more is said."""
     return glass(roughness, ior, **{"depth": 0.5, **WHITE, **transmission})
-
-
-@pytest.mark.parametrize(
-    ("body", "ior", "anisotropy"),
-    one_of(("box", 1.3, -0.5), ("sphere", 1.005, 0.0), ("sphere", 1.5, 0.8), ("cylinder", 1.5, 0.0)),
-)
-def test_milk_before_white_is_not_seen(body: str, ior: float, anisotropy: float) -> None:
-    """Where nothing is absorbed a white furnace stays white: each path brings all or, at its last bounce, nothing."""
-    objects = {"body": {**BODIES[body], "material": "milk"}}
-    found = scene(objects, {"milk": milk(ior, scatter_anisotropy=anisotropy)}, bounces=64)
-    assert abs(colors_of(found, 16).mean() - 1) < 0.01
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("ior", one_of(1.5, 1.005))
-def test_sets_of_milk_before_white_are_not_seen(ior: float) -> None:
-    """Within a set each scattering is a bounce."""
-    found = ball(0, ior, bounces=64, transmission={"depth": 1.0, "scatter_anisotropy": 0.3, **WHITE})
-    assert abs(seen(found, 32)[0].mean() - 1) < 0.01
-
-
-@pytest.mark.combination
-def test_what_stands_in_milk_before_white_is_not_seen() -> None:
-    """A white ball, a bubble of air's index, and milk in milk; the eye outside and inside."""
-    materials = {
-        "milk": milk(1.3),
-        "cream": milk(1.5, 0.3, depth=0.2),
-        "air": glass(0, 1.0),
-        "white": {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}},
-    }
-    parts = {
-        "milk": {"type": "box", "size": [3, 3, 3], "material": "milk"},
-        "core": {"type": "sphere", "radius": 0.5, "position": [0.6, -0.5, 0.4], "material": "white"},
-        "cream": {"type": "sphere", "radius": 0.6, "position": [-0.7, -0.8, -0.3], "material": "cream"},
-        "bubble": {"type": "sphere", "radius": 0.4, "position": [0.5, -1, -0.7], "material": "air"},
-    }
-    for eye in ([0, 39, 0], [0.1, 42.7, 0.5]):
-        found = scene(parts, materials, camera={"position": eye, "target": [0, 44, 0], "fov": 50}, bounces=64)
-        colors = colors_of(found, 64)
-        assert abs(colors.mean() - 1) < 0.015
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
@@ -136,28 +95,6 @@ def test_the_eye_in_milk_sees_milk() -> None:
     assert (film["N.Y"] < 0).all()
     assert (film["object"] == film["object"][0, 0]).mean() > 0.99
     assert film["object"][0, 0] > 0
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("lanes", [4, 16])
-def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_usable("float32", lanes)
-    found = scene(
-        {"body": {**BODIES["box"], "material": "milk"}}, {"milk": milk(color=[0.8, 0.9, 0.7])}, bounces=16
-    )
-    pictures = []
-    for each in (1, lanes):
-        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
-        pictures.append(colors_of(found, 8))
-    assert np.isclose(pictures[0], pictures[1], rtol=1e-3, atol=1e-4).mean() > 0.8
-    assert abs(pictures[0].mean() / pictures[1].mean() - 1) < 0.01
-
-
-def test_parts_of_a_picture_have_its_bits() -> None:
-    found = scene({"body": {**BODIES["box"], "material": "milk"}}, {"milk": milk()}, bounces=8)
-    whole = colors_of(found, 4)
-    part = colors_of(found, 4, region=(8, 12, 10, 9))
-    assert np.array_equal(part, whole[12:21, 8:18])
 
 
 @pytest.mark.parametrize("scatter", [None, 0, 1])

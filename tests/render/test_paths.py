@@ -94,27 +94,6 @@ def test_a_disc_is_found_by_mirrors() -> None:
     assert abs(colors[middle].mean() * math.sin(math.radians(20)) ** 2 - 1) < 0.02
 
 
-WHITE_ROOMS: dict[str, dict[str, Any]] = {
-    "clay": {"base": {"color": [1, 1, 1], "diffuse_roughness": 0.7}, "specular": {"weight": 0}},
-    "gloss": {"base": {"color": [1, 1, 1]}, "specular": {"roughness": 0.4}},
-    "metal": {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0.6}},
-    "coat": {"base": {"color": [1, 1, 1]}, "coat": {"weight": 1, "roughness": 0.3}},
-}
-
-
-@pytest.mark.parametrize("name", WHITE_ROOMS)
-def test_white_before_white_is_not_seen(name: str) -> None:
-    """A convex body that reflects all light, under a white sky: every pixel is white."""
-    scene = scene_of(
-        background=GREY,
-        materials={"m": WHITE_ROOMS[name]},
-        material={"name": "m"},
-        lighting=path(2),
-    )
-    colors = seen(scene, 64)[0]
-    assert abs(colors.mean() - 1) < 0.01
-
-
 @pytest.mark.parametrize(
     ("roulette", "surroundings"),
     one_of((0, "environment"), (64, "background"), (0, "background"), (64, "environment")),

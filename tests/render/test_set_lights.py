@@ -203,18 +203,6 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
     assert not (shoot(hidden, device)["R"] > 0.5).any()
 
 
-@pytest.mark.combination
-@pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
-def test_pictures_repeat_for_any_number_of_lanes(device: Device, mode: dict[str, Any]) -> None:
-    scene = lit({"count": 300, "radius": 0.01}, 8, **mode)
-    one, many = (shoot(scene, device, lanes=lanes)["R"] for lanes in (1, 8))
-    assert np.array_equal(many, shoot(scene, device, lanes=8)["R"])
-    # A rounding may choose another ball now and then.
-    assert np.mean(np.isclose(one, many, rtol=1e-3, atol=1e-4)) > 0.98
-    exact = shoot(scene, device, precision="float64", lanes=1)["R"].astype(float)
-    assert exact.mean() == pytest.approx(one.mean(), rel=0.02)
-
-
 def test_colours_follow_the_trap() -> None:
     scene = lit({"count": 100, "palette": ["#000", "#fff"]}, 1)
     _, balls = balls_of(scene)

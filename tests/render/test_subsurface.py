@@ -10,17 +10,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import yaml
 
 import clfractal
-from clfractal.errors import SceneError
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
-from tests.devices import check_usable
 from tests.render.glass_scenes import BODIES, colors_of, scene
-from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
-from tests.variants import one_of
+from tests.render.path_scenes import BLACK, GREY, path, scene_of, seen
 
 pytestmark = pytest.mark.light
 
@@ -60,31 +56,6 @@ def test_inversion_is_that_of_thick_bodies() -> None:
         albedo = 1 - s * s
         back = 1 - depth_function(albedo, cosines) * np.sqrt(1 - albedo)
         assert abs((weights * cosines * back).sum() - color) < 0.003
-
-
-@pytest.mark.parametrize("radius", one_of(0.05, 0.5, 0.004))
-def test_white_sets_before_white_are_not_seen(radius: float) -> None:
-    """With a boundary, a coat and fuzz over it, and beside a diffuse part of the body.
-
-    (Each path brings more and more of one colour where they scatter unlike, so all colours together are looked at.)
-    """
-    white = {"color": [1, 1, 1]}
-    material = {
-        "base": white,
-        "coat": {"weight": 0.5, "roughness": 0.3},
-        "fuzz": {"weight": 0.3},
-        "subsurface": {**white, "weight": 0.7, "radius": radius},
-    }
-    colors = seen(set_of(material, 16), 32)[0]
-    assert abs(colors.mean() - 1) < 0.01
-
-
-@pytest.mark.parametrize("body", one_of(*BODIES))
-def test_white_objects_before_white_are_not_seen(body: str) -> None:
-    objects = {"body": {**BODIES[body], "material": "m"}}
-    material = skin({"roughness": 0.4}, color=[1, 1, 1], radius=0.2, scatter_anisotropy=0.4)
-    colors = colors_of(scene(objects, {"m": material}, bounces=16), 32)
-    assert np.abs(colors.mean(axis=(0, 1)) - 1).max() < 0.01
 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.6, -0.4])
@@ -151,58 +122,6 @@ def test_a_ball_is_that_of_a_random_walk() -> None:
     np.testing.assert_allclose(of_object, expected, atol=0.01)
 
 
-def test_white_joined_sets_before_white_are_not_seen() -> None:
-    """Two materials flow into each other, of which one's base is black but never seen; a hole is cut into both."""
-    objects = {
-        "drop": {
-            "type": "sphere",
-            "radius": 0.6,
-            "position": [0.9, 0, 0.2],
-            "join": "smooth_union",
-            "material": "n",
-        },
-        "hole": {"type": "box", "size": [0.5, 3, 0.5], "join": "cut", "material": "m"},
-    }
-    white = skin({"roughness": 0.3}, color=[1, 1, 1], radius=0.1)
-    materials = {"m": white, "n": {"base": {"color": [1, 1, 1]}}}
-    found = set_of(white, 32, materials=materials, objects=objects)
-    assert np.abs(seen(found, 96)[0].mean(axis=0) - 1).max() < 0.012
-
-
-@pytest.mark.combination
-def test_what_stands_in_skin_keeps_light() -> None:
-    """Glass and a white ball within the set, of which parts look out."""
-    objects = {
-        "glass": {"type": "sphere", "radius": 0.4, "position": [0.5, -0.9, 0.3], "material": "glass"},
-        "core": {"type": "sphere", "radius": 0.5, "position": [-0.4, -0.8, 0], "material": "white"},
-    }
-    materials = {
-        "m": skin({"roughness": 0.3}, color=[1, 1, 1], radius=0.2),
-        "glass": {"specular": {"roughness": 0.1}, "transmission": {"weight": 1}},
-        "white": {"base": {"color": [1, 1, 1]}},
-    }
-    found = set_of(materials["m"], 64, materials=materials, objects=objects)
-    assert np.abs(seen(found, 32)[0].mean(axis=0) - 1).max() < 0.015
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("lanes", [4, 16])
-def test_lanes_do_not_matter(lanes: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    check_usable("float32", lanes)
-    found = set_of(skin(radius=0.1), background={"top": [1, 0.6, 0.2], "bottom": [0.1, 0.2, 0.5]})
-    pictures = []
-    for each in (1, lanes):
-        monkeypatch.setenv("CLFRACTAL_LANES", str(each))
-        pictures.append(colors_of(found, 8))
-    assert abs(pictures[0].mean() / pictures[1].mean() - 1) < 0.01
-
-
-def test_parts_of_a_picture_have_its_bits() -> None:
-    found = set_of(skin(radius=0.1))
-    whole = colors_of(found, 4)
-    assert np.array_equal(colors_of(found, 4, region=(8, 12, 10, 9)), whole[12:21, 8:18])
-
-
 def test_scenes_without_it_do_not_know_it() -> None:
     texts = []
     for values in ({}, {"color": [0.5, 0.6, 0.7], "radius": 2}):
@@ -211,19 +130,3 @@ def test_scenes_without_it_do_not_know_it() -> None:
         texts.append([text.flat.text for text in program_texts(found, plan)])
     assert texts[0] == texts[1]
     assert len(texts[0]) == 5
-
-
-@pytest.mark.parametrize(
-    ("subsurface", "message"),
-    [
-        ({"weigth": 1}, "materials.m.subsurface: unknown key 'weigth'; did you mean 'weight'?"),
-        ({"weight": 2}, "materials.m.subsurface.weight: must be at most 1, got 2"),
-        ({"radius": -1}, "materials.m.subsurface.radius: must be at least 0, got -1"),
-        ({"radius_scale": [1, 2, 1]}, "materials.m.subsurface.radius_scale.1: must be at most 1, got 2"),
-    ],
-)
-def test_what_cannot_be_is_told(subsurface: dict[str, Any], message: str) -> None:
-    values = {"version": 1, "formula": BALL, "camera": {}, "materials": {"m": {"subsurface": subsurface}}}
-    with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump(values))
-    assert message in str(caught.value)

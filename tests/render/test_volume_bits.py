@@ -10,17 +10,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device, has_float64
-from clfractal.device.tune import accepted_lanes
-from clfractal.engine import drawing
+from clfractal.device.select import Device
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.images.tiles import TileGrid
-from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
 from tests import scenes
-from tests.render.bits import close, same
-from tests.render.shots import BALL, PERSPECTIVE, plan_of, points_of, render_tile, shoot, stacked
+from tests.render.bits import same
+from tests.render.shots import BALL, PERSPECTIVE, points_of, shoot, stacked
 from tests.render.volumes import FLAT, LIT, keep, middles, volume_scene
 
 SIZE = (70, 40)
@@ -43,70 +39,11 @@ def scene_of(**sections: Any) -> Scene:
 BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}
 VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "shadows": True}
 UNSEEN = {"plane": {"center": [0, 0, 9]}, "opacity": 0}
-# Of programs that others need: the grids are those of voxels/test_fill.py, one plane through a grid is that of figure 9
-# and, in float64, of test_planes_in_picture.py, which also has four planes.
-SCENES = {
-    "surface": scene_of(renderer=VOLUME, formula=HAST, cut_planes=PLANES[1:]),
-    "fog": scene_of(
-        renderer={**VOLUME, "transfer": FOG, "samples": 3}, formula=HAST, background="transparent"
-    ),
-    "cut object": scene_of(renderer={"type": "surface"}, cut_planes=[*PLANES, UNSEEN, UNSEEN]),
-}
 
 
 def shaded(look: dict[str, Any]) -> dict[str, Any]:
     """With shadows, as the other fog of this file: the same program."""
     return {**look, "lights": [{**light, "shadow": True} for light in look["lights"]]}
-
-
-@pytest.fixture(scope="module")
-def wholes(device: Device) -> dict[str, npt.NDArray[np.float32]]:
-    """Each scene in one go."""
-    return {name: stacked(shoot(scene, device)) for name, scene in SCENES.items()}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_tiles_and_regions(
-    device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
-) -> None:
-    """A tile by itself, a part that begins anywhere, tiles one by one and in parts: the bits of the whole."""
-    scene, whole = SCENES[name], wholes[name]
-    plan = plan_of(scene, device)
-    for index in (1, 3, 5):
-        tile = TileGrid(plan.region).tile(index)
-        pixels = np.moveaxis(render_tile(scene, plan, device, tile), 0, -1)
-        expected = whole[tile.y : tile.y + tile.height, tile.x : tile.x + tile.width]
-        assert same(np.ascontiguousarray(pixels), np.ascontiguousarray(expected))
-    for x, y, width, height in ((13, 7, 50, 31), (33, 20, 1, 1), (64, 32, 6, 8)):
-        part = stacked(shoot(scene, device, region=(x, y, width, height)))
-        assert same(part, np.ascontiguousarray(whole[y : y + height, x : x + width]))
-    monkeypatch.setattr(drawing, "CAPACITY", 1)
-    assert same(stacked(shoot(scene, device)), whole)
-    assert same(stacked(shoot(scene, device, budget_seconds=1e-9)), whole)
-
-
-@pytest.mark.parametrize(
-    ("name", "counts"),
-    [
-        ("surface", {1}),
-        ("fog", {4, 8, 16}),
-        pytest.param("surface", {4, 8, 16}, marks=pytest.mark.combination),
-        pytest.param("fog", {1}, marks=pytest.mark.combination),
-    ],
-)
-def test_other_lane_counts(
-    device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str, counts: set[int]
-) -> None:
-    """Packets of another width are another program: the last bits differ, and with them what decides at a rim."""
-    for lanes in counts.intersection(accepted_lanes(device, "float32")):
-        if lanes != best_lanes(device, "float32"):
-            close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
-
-
-def test_float64_shows_the_same(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
-    """With cut planes the rays have the number type of the fill; what they see is the same."""
-    if has_float64(device.info):
-        close(stacked(shoot(SCENES["surface"], device, "float64")), wholes["surface"])
 
 
 @pytest.mark.parametrize("parts", [2, 4])
