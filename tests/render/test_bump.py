@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +11,6 @@ import pytest
 import clfractal
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
-from clfractal.errors import ClfractalError
 from clfractal.integrators.points import distances
 from clfractal.scene.load import dump_scene
 from tests.devices import check_usable
@@ -298,56 +296,6 @@ def test_traps_on_objects_beside_the_set() -> None:
 
 
 # -- what is told
-
-
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        ("{bump: {height: §2e6}}", "materials.m.bump.height: must be at most 1000000, got 2000000.0"),
-        ("{bump: {height: §tall}}", "materials.m.bump.height: must be a number, got 'tall'"),
-        ("{bump: {§hight: 1}}", "materials.m.bump: unknown key 'hight'; did you mean 'height'?"),
-        ("{bump: {width: §0}}", "materials.m.bump.width: must be above 0, got 0"),
-        ("{bump: {height: §{}}}", "materials.m.bump.height: needs one of by or texture"),
-        (
-            "{bump: {height: {by: trap, curve: [[0, 0], [1, §-2e6]]}}}",
-            "materials.m.bump.height.curve.1.1: must be at least -1e+06, got -2e+06",
-        ),
-        (
-            "{bump: {height: {texture: §none.png}}}",
-            "materials.m.bump.height.texture: none.png cannot be read: No such file or directory",
-        ),
-        (
-            "{blend: [a, a], bump: §{height: 1}}",
-            "materials.m.bump: cannot be combined with blend: a blend takes its layers from others",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told(
-    text: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    head = "version: 1\nformula: {name: mandelbulb}\ncamera: {}\nmaterials:\n  a: {}\n"
-    line = f"  m: {text}"
-    with pytest.raises(ClfractalError) as caught:
-        clfractal.load_scene(head + line.replace("§", "") + "\n")
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert caught.value.status == 2
-    assert str(caught.value).startswith(f"scene:6:{line.index('§') + 1}: ")
-
-
-def test_direct_light_refuses_reliefs_of_objects() -> None:
-    text = """version: 1
-formula: {name: mandelbulb}
-camera: {}
-materials: {m: {bump: {height: {by: trap}}}}
-objects: {b: {material: m}}
-"""
-    with pytest.raises(
-        ClfractalError,
-        match=r"objects\.b\.material: 'm' differs from place to place, which needs lighting\.mode: path",
-    ):
-        clfractal.load_scene(text)
 
 
 def test_a_scene_with_a_relief_is_written_and_read() -> None:

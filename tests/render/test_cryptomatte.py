@@ -206,12 +206,6 @@ def test_what_cannot_be_is_told(sections: dict[str, Any], channels: list[str], m
         clfractal.render(scene_of(**sections), channels=channels)
 
 
-def test_half_is_refused() -> None:
-    text = "version: 1\nformula: {name: hast}\ncamera: {}\noutput: {precision: {CryptoObject00.R: half}}\n"
-    with pytest.raises(SceneError, match="must be float: numbers of things are exact"):
-        clfractal.load_scene(text)
-
-
 def test_layers_in_scene_files() -> None:
     text = "version: 1\nformula: {name: hast}\ncamera: {}\noutput:\n  channels: [R, CryptoObject, N]\n"
     scene = clfractal.load_scene(text)

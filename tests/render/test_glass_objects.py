@@ -160,25 +160,6 @@ def test_sets_that_are_no_glass_have_no_march_within() -> None:
     assert names == ["rays", "begin", "interactions", "objects", "scatter", "gather"]
 
 
-@pytest.mark.parametrize(
-    ("objects", "message"),
-    [
-        (
-            {"bulb": {"type": "formula", "formula": BALL, "material": "glass"}},
-            "objects.bulb.material: 'glass' is glass, which formulas and what is joined can be only with all of the set",
-        ),
-        (
-            {"ball": {"type": "sphere", "join": "cut", "material": "glass"}},
-            "objects.ball.material: 'glass' is glass, which formulas and what is joined can be only with all of the set",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told(objects: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump(plain_scene(objects)))
-    assert message in str(caught.value)
-
-
 def test_only_lamps_with_a_size_may_stand_in_glass() -> None:
     values = plain_scene({"ball": {"type": "sphere", "position": [4, 0, 0], "material": "glass"}})
     lamp = {"position": [4, 0, 0.2]}

@@ -7,14 +7,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import yaml
 
 import clfractal
-from clfractal.errors import SceneError
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
 from tests.render.glass_scenes import ball
-from tests.render.path_scenes import BALL, path, scene_of, seen
+from tests.render.path_scenes import path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -91,32 +89,3 @@ def test_scenes_without_glass_do_not_know_it() -> None:
         assert [text.name for text in found] == ["rays", "begin", "interactions", "scatter", "gather"]
         texts.append([text.flat.text for text in found])
     assert texts[0] == texts[1]
-
-
-@pytest.mark.parametrize(
-    ("transmission", "message"),
-    [
-        (
-            {"scatter": [0.5, 0.5, 0.5]},
-            "materials.m.transmission.scatter: needs a depth above 0: scattering is told for the way through it",
-        ),
-        ({"scater": [1, 1, 1]}, "materials.m.transmission: unknown key 'scater'; did you mean 'scatter'?"),
-        ({"depth": 1, "scatter": [2, 1, 1]}, "materials.m.transmission.scatter.0: must be at most 1, got 2"),
-        (
-            {"depth": 1, "scatter_anisotropy": 1},
-            "materials.m.transmission.scatter_anisotropy: must be at most 0.99, got 1",
-        ),
-        ({"wait": 1}, "materials.m.transmission: unknown key 'wait'; did you mean 'weight'?"),
-        ({"weight": 1.5}, "materials.m.transmission.weight: must be at most 1, got 1.5"),
-        ({"depth": -1}, "materials.m.transmission.depth: must be at least 0, got -1"),
-        (
-            {"dispersion_abbe_number": 0},
-            "materials.m.transmission.dispersion_abbe_number: must be at least 1, got 0",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told(transmission: dict[str, Any], message: str) -> None:
-    values = {"version": 1, "formula": BALL, "camera": {}, "materials": {"m": {"transmission": transmission}}}
-    with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump(values))
-    assert message in str(caught.value)

@@ -11,7 +11,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
-from clfractal.errors import FileError, SceneError
+from clfractal.errors import SceneError
 from clfractal.scene.layout import Layout
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -144,79 +144,3 @@ def test_progress_and_the_rest_of_a_film(device: Device) -> None:
     whole = shoot_whole(scene, device)
     np.testing.assert_array_equal(framebuffer["R"][tile.height :], whole["R"][tile.height :])
     np.testing.assert_array_equal(framebuffer["R"][:, tile.width :], whole["R"][:, tile.width :])
-
-
-@pytest.mark.parametrize(
-    ("views", "layout", "size", "message"),
-    [
-        (
-            [{}, {}, {}],
-            {"gap": 20},
-            (41, 8),
-            "layout.views.0: does not fit into a picture of 41 x 8 pixels",
-        ),
-        (
-            [{"area": [0, 0, 1e-3, 1]}, {}],
-            {},
-            (64, 8),
-            "layout.views.0: does not fit into a picture of 64 x 8 pixels",
-        ),
-        (
-            [{"area": [0.5, 0, 0.6, 1]}],
-            {},
-            (64, 8),
-            "layout.views.0.area: must lie within the picture, [0, 0, 1, 1], and not be empty",
-        ),
-        (
-            [{"area": [0.5, 0, 0.0, 1]}],
-            {},
-            (64, 8),
-            "layout.views.0.area: must lie within the picture, [0, 0, 1, 1], and not be empty",
-        ),
-        ([{"area": [0.5, 0, -0.5, 1]}], {}, (64, 8), "layout.views.0.area.2: must be at least 0, got -0.5"),
-        (
-            [{"area": [0.5, 0, 0.5]}],
-            {},
-            (64, 8),
-            "layout.views.0.area: must be a list of 4 numbers, got a list of 3",
-        ),
-        ([], {}, (64, 8), "layout.views: must not be empty"),
-        ([{}] * 17, {}, (64, 8), "layout.views: must have at most 16 entries, got 17"),
-        ([{"formula": {}}], {}, (64, 8), "layout.views.0: unknown key 'formula'"),
-        ([{}], {"columns": 0}, (64, 8), "layout.columns: must be at least 1, got 0"),
-        ([{}], {"gap": -1}, (64, 8), "layout.gap: must be at least 0, got -1"),
-        (
-            [{}, {"renderer": {"type": "volume", "zoom": [{"center": [9, 0, 0], "scale": 2}]}}],
-            {},
-            (64, 8),
-            "layout.views.1.renderer.zoom.0.center: the box must lie within the one before",
-        ),
-        (
-            [{}, {"renderer": {"type": "cut_plane", "colors": {"palette": "viridiss"}}}],
-            {},
-            (64, 8),
-            "layout.views.1.renderer.colors.palette: unknown palette 'viridiss'; did you mean 'viridis'?",
-        ),
-        (
-            [{"renderer": {"type": "volume", "file": "missing.nrrd"}}],
-            {},
-            (64, 8),
-            "layout.views.0.renderer.file: ",
-        ),
-        (
-            [{"environment": {"name": "studoi"}}],
-            {},
-            (64, 8),
-            "layout.views.0.environment.name: unknown environment 'studoi'; did you mean 'studio'?",
-        ),
-    ],
-)
-def test_bad_layouts(
-    views: list[dict[str, Any]], layout: dict[str, Any], size: tuple[int, int], message: str
-) -> None:
-    """All of it is said before anything is rendered."""
-    with pytest.raises((SceneError, FileError)) as caught:
-        scene_of(views, size, **layout)
-    assert str(caught.value).startswith(message)
-    assert "\n" not in str(caught.value)
-    assert caught.value.status == 2

@@ -8,21 +8,19 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-import yaml
 from PIL import Image
 
 import clfractal
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
 from clfractal.engine.prepare import prepare
-from clfractal.errors import ClfractalError
 from clfractal.files.srgb import decode
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.shading.maps import level_sizes, levels_of
 from tests.devices import check_usable
 from tests.render.color_maps import BULB, Floats, ramp
-from tests.render.path_scenes import BALL, BLACK, GREY, path, scene_of, seen
+from tests.render.path_scenes import GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -256,77 +254,6 @@ def test_levels_keep_the_mean(shape: tuple[int, int]) -> None:
 
 
 # -- what is told
-
-
-@pytest.mark.parametrize(
-    ("materials", "message"),
-    [
-        ({"m": {"blend": ["a", "m"]}, "a": {}}, "materials.m.blend: is made of itself: m -> m"),
-        (
-            {"m": {"blend": ["a", "b"]}, "a": {}, "b": {"blend": ["m", "a"]}},
-            "materials.b.blend: is made of itself: b -> m -> b",
-        ),
-        ({"m": {"blend": ["rok", "m"]}, "rock": {}}, "blend.0: unknown material 'rok'; did you mean 'rock'?"),
-        ({"m": {"blend": ["m"]}}, "materials.m.blend: must have at least 2 entries, got 1"),
-        (
-            {"m": {"blend": ["a", "a"], "base": {"weight": 0.5}}, "a": {}},
-            "m.base: cannot be combined with blend",
-        ),
-        ({"m": {"mask": 0.3}}, "materials.m.mask: applies to a blend of two materials"),
-        ({"m": {"base": {"weight": {}}}}, "materials.m.base.weight: needs one of by or texture"),
-        (
-            {"m": {"base": {"weight": {"by": "normal", "curve": [[0, 0], [1, 2]]}}}},
-            "materials.m.base.weight.curve.1.1: must be at most 1, got 2",
-        ),
-        (
-            {"m": {"specular": {"ior": {"by": "normal"}}}},
-            "materials.m.specular.ior.curve.0.1: must be at least 1, got 0",
-        ),
-        (
-            {"m": {"base": {"color": {"by": "normal", "palette": [[0, 0, 0], [0, 3, 0]]}}}},
-            "materials.m.base.color.palette.1.color: must be at most 1, got 3",
-        ),
-        (
-            {"m": {"base": {"color": {"by": "normal", "palette": "virids"}}}},
-            "materials.m.base.color.palette: unknown palette 'virids'; did you mean 'viridis'?",
-        ),
-        (
-            {"m": {"base": {"weight": {"by": "normal", "range": [1, 1]}}}},
-            "materials.m.base.weight.range: must be two different numbers, got 1 twice",
-        ),
-        (
-            {"m": {"base": {"weight": {"by": "normal", "curve": [[0.5, 0], [0.2, 1]]}}}},
-            "curve.1.0: must be at least 0.5, the place of the point before, got 0.2",
-        ),
-        ({"m": {"base": {"weight": {"by": "hight"}}}}, "did you mean 'height'?"),
-        ({"m": {"base": {"weight": "thick"}}}, "materials.m.base.weight: must be a number, got 'thick'"),
-        (
-            {"m": {"base": {"color": {"texture": "none.png"}}}},
-            "materials.m.base.color.texture: none.png cannot be read: No such file",
-        ),
-        (
-            {"m": {"base": {"color": {"texture": "text.png"}}}},
-            "materials.m.base.color.texture: text.png is no picture, or a damaged one",
-        ),
-        (
-            {"m": {"base": {"color": {"texture": "../x.png"}}}},
-            "materials.m.base.color.texture: must be a path inside the scene's folder, got '../x.png'",
-        ),
-    ],
-)
-def test_what_cannot_be_is_told(
-    materials: dict[str, Any], message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("text.png").write_text("no picture")
-    text = yaml.safe_dump(
-        {"version": 1, "formula": BALL, "camera": {}, "background": BLACK, "materials": materials}
-    )
-    with pytest.raises(ClfractalError) as caught:
-        clfractal.load_scene(text)
-    assert message in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert caught.value.where.line is not None
 
 
 def test_a_scene_with_maps_is_written_and_read(tmp_path: Path, picture: npt.NDArray[np.uint8]) -> None:

@@ -10,11 +10,9 @@ import numpy as np
 import numpy.typing as npt
 import OpenEXR
 import pytest
-import yaml
 
 import clfractal
-from clfractal.errors import SceneError
-from tests.render.path_scenes import BALL, GREY, path, scene_of, seen
+from tests.render.path_scenes import GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
@@ -167,40 +165,6 @@ def test_the_light_of_a_part_is_limited_and_told() -> None:
     assert dark["R"].sum() < bright["R"].sum()
     assert any("lighting.clamp" in line for line in dark.remarks)
     assert not any("lighting.clamp" in line for line in bright.remarks)
-
-
-@pytest.mark.parametrize(
-    ("sections", "message"),
-    [
-        ({"material": {"name": "gold"}}, "material.name: names 'gold', but the scene has no materials"),
-        (
-            {"material": {"name": "gold"}, "materials": {"gould": {}}},
-            "material.name: unknown material 'gold'; did you mean 'gould'?",
-        ),
-        (
-            {"renderer": {"points": {}}, "lighting": path()},
-            "renderer.points: cannot be combined with lighting.mode path",
-        ),
-        (
-            {"renderer": {"normal": "least_squares"}, "lighting": path()},
-            "renderer.normal: cannot be combined with lighting.mode path",
-        ),
-        (
-            {"renderer": {"type": "volume"}, "lighting": path()},
-            "lighting.mode: must be direct for a volume's surface, got path",
-        ),
-        (
-            {"materials": {"m": {"specular": {"ior": 0.9}}}},
-            "materials.m.specular.ior: must be at least 1, got 0.9",
-        ),
-        ({"lighting": {"mode": "path", "bounces": 257}}, "lighting.bounces: must be at most 256, got 257"),
-        ({"lighting": {"mode": "direct", "bounces": 3}}, "lighting"),
-    ],
-)
-def test_what_cannot_be_is_told(sections: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        clfractal.load_scene(yaml.safe_dump({"version": 1, "formula": BALL, "camera": {}, **sections}))
-    assert message in str(caught.value)
 
 
 def test_ignored_keys_are_told() -> None:

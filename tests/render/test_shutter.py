@@ -18,7 +18,7 @@ import clfractal
 from clfractal.camera.views import View
 from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
-from clfractal.errors import ClfractalError, SceneError
+from clfractal.errors import ClfractalError
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import shutter as shutters
 from clfractal.integrators.shutter import Shutter, shutter_of
@@ -306,21 +306,6 @@ def test_unfinished_work_of_another_movement_is_another_picture(engine: Engine) 
 
 
 # -- bad input
-
-
-@pytest.mark.parametrize(
-    ("animation", "message"),
-    [
-        ({"shutter": 1.5}, "animation.shutter: must be at most 1, got 1.5"),
-        ({"shutter": "half"}, "must be a part of a frame, as 0.5, or '180 deg', got 'half'"),
-        ({"shutter": "400 deg"}, "animation.shutter: must be at most 1, got 1.11"),
-        ({"frame": 10}, "must be one of the frames 0 to 9, got 10"),
-    ],
-)
-def test_what_is_no_shutter(animation: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        load_scene(film_of(PANNING, animation=animation))
-    assert message in str(caught.value)
 
 
 def test_degrees_of_a_turning_shutter() -> None:

@@ -11,7 +11,6 @@ import pytest
 
 import clfractal.integrators.volume
 from clfractal.device.select import Device
-from clfractal.errors import SceneError
 from clfractal.integrators.volume import brick_bounds
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
@@ -292,27 +291,3 @@ def test_bounds_hold(device: Device, folder: Path) -> None:
     highest = -np.log(1 - OPACITY * ranges[:, 1].astype(float))
     assert (bounds >= highest * (1 - 1e-6)).all()
     assert bounds.max() == pytest.approx(highest.max(), rel=0.01)
-
-
-@pytest.mark.parametrize(
-    ("sections", "message"),
-    [
-        ({"fog": {"density": 0.1}}, "fog: cannot be combined with lighting.mode path in a volume"),
-        ({"cut_planes": [{}]}, "cut_planes: cannot be combined with lighting.mode path in a volume"),
-        ({"transfer": {"opacity": None}}, "lighting.mode: must be direct for a volume's surface, got path"),
-        (
-            {"transfer": {"opacity": None, "emission": [{"at": 0, "emission": [1, 1, 1]}]}},
-            "renderer.transfer.emission: needs opacity, since a surface at a level has no depth that shines",
-        ),
-        ({"anisotropy": 1.0}, "renderer.anisotropy: must be at most 0.95, got 1"),
-        (
-            {"transfer": {"emission": [{"at": 1, "emission": [1, 1, 1]}, {"at": 0, "emission": [1, 1, 1]}]}},
-            "renderer.transfer.emission.1.at: must be at least 1, the value at the stop before, got 0",
-        ),
-        ({"transfer": {"emission": [{"at": 1, "emission": [1, -1, 1]}]}}, "must be at least 0, got -1"),
-    ],
-)
-def test_what_cannot_be_is_told(folder: Path, sections: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        medium(folder, **sections)
-    assert message in str(caught.value)
