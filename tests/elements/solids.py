@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
+import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
@@ -28,6 +29,7 @@ from tests.render.shots import (
     shoot,
     view_of,
 )
+from tests.variants import combinations, one_of
 from tests.voxels.grids import ROUNDED, filled, voxel_points
 
 
@@ -229,3 +231,65 @@ def check_choices(known: Known, own: list[float], precision: Precision, lanes: i
     spread = np.sqrt((moments(directions, axis) ** 2 * brings[:, None] ** 2).mean(axis=0))
     assert (np.abs(found - right) < 0.02 * spread).all(), (found, right)
     assert 0.1 < rows[0, 5] / LUMINANCE / min(right[0], math.pi) < 10
+
+
+class Checks:
+    """Where the kinds of a solid are, alone: tests of an element take them from here."""
+
+    KINDS: ClassVar[dict[str, Known]]
+
+    def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
+        """A test has an argument of each table or list of its class, by the name in small letters."""
+        for name in {"KINDS", "JOINED", "GLASS", "LAMPS", "POINTS"} & set(dir(self)):
+            if name.lower() in metafunc.fixturenames:
+                given = getattr(self, name)
+                values = given.values() if isinstance(given, dict) else given
+                metafunc.parametrize(name.lower(), values, ids=list(given))
+
+    def test_what_it_holds(self, kinds: Known) -> None:
+        check_inside(kinds)
+
+    @pytest.mark.parametrize("camera", CAMERAS)
+    @pytest.mark.parametrize(
+        ("precision", "lanes"), one_of(("float32", None), ("float32", 1), ("float64", 4))
+    )
+    def test_it_is_where_its_equation_is_zero(
+        self, kinds: Known, camera: str, precision: Precision, lanes: int | None, device: Device
+    ) -> None:
+        check_alone(kinds, device, camera, precision, lanes)
+
+    def test_a_plane_opens_it(self, kinds: Known, device: Device) -> None:
+        """Also where the first part of a ray within is taken away, and the second is not."""
+        check_opened(kinds, device)
+
+
+class AllChecks(Checks):
+    """And as parts of a set, of glass, and as lights.
+
+    Attributes:
+        GLASS, LAMPS: names of kinds.
+        POINTS: of half axes, from where those that shine are seen, close to them too.
+    """
+
+    JOINED: ClassVar[dict[str, Known]]
+    GLASS: ClassVar[tuple[str, ...]]
+    LAMPS: ClassVar[tuple[str, ...]]
+    POINTS: ClassVar[dict[str, list[float]]]
+
+    @pytest.mark.parametrize("join", ["cut", "intersection"])
+    def test_it_is_joined_to_the_set(self, joined: Known, join: str, device: Device) -> None:
+        check_joined(joined, device, join)
+
+    @pytest.mark.parametrize("join", ["union", "cut", "intersection"])
+    def test_its_voxels(self, joined: Known, join: str) -> None:
+        check_voxels(joined, join)
+
+    @pytest.mark.parametrize("roughness", [0.0, *combinations([0.5])])
+    def test_glass_is_not_seen_before_white(self, glass: str, roughness: float) -> None:
+        check_glass(self.KINDS[glass], roughness)
+
+    @pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", 8), ("float32", 1), ("float64", 8)))
+    def test_even_light_is_found_in_all_directions(
+        self, lamps: str, points: list[float], precision: Precision, lanes: int
+    ) -> None:
+        check_choices(self.KINDS[lamps], points, precision, lanes)

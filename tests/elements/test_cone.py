@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import math
-from typing import Any
+from dataclasses import replace
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from clfractal.device.structs import Precision
-from tests.devices import device
+from clfractal.device.select import Device
 from tests.elements import solids
 from tests.render.emitter_choices import choices, shining
-from tests.render.joined_oracle import Distance, Floats
-from tests.render.shots import CAMERAS
-from tests.variants import one_of
+from tests.render.joined_oracle import Floats
 
 
 def cone(radius: float, top: float, height: float, **placed: Any) -> solids.Known:
@@ -33,8 +31,12 @@ def cone(radius: float, top: float, height: float, **placed: Any) -> solids.Know
         inside = (np.abs(at[..., 1]) < height / 2) & (at[..., 0] < radius + slope * (at[..., 1] + height / 2))
         return np.where(inside, -far, far)
 
-    own: Distance = distance
-    return solids.Known({"type": "cone", "radius": radius, "top": top, "height": height}, own, **placed)
+    return solids.Known({"type": "cone", "radius": radius, "top": top, "height": height}, distance, **placed)
+
+
+def still(known: solids.Known) -> solids.Known:
+    """The same in its own space."""
+    return replace(known, rotation=[0, 0, 0], position=[0, 0, 0])
 
 
 KINDS = {
@@ -69,77 +71,39 @@ def by_equation(known: solids.Known, origin: Floats, direction: Floats) -> Float
 @pytest.mark.parametrize("kind", KINDS)
 def test_rays_go_as_far_as_its_equation_says(kind: str) -> None:
     """The march that all else is compared with."""
-    still = solids.Known(KINDS[kind].values, KINDS[kind].own, [0, 0, 0], [0, 0, 0])
+    known = replace(still(KINDS[kind]), scale=[1, 1, 1])
     rng = np.random.default_rng(3)
     origin = rng.normal(size=(4000, 3))
     origin *= 3 / np.linalg.norm(origin, axis=1)[:, None]
     direction = rng.uniform(-0.7, 0.7, (4000, 3)) - origin
     direction /= np.linalg.norm(direction, axis=1)[:, None]
-    right, found = by_equation(still, origin, direction), still.met(origin, direction)
+    right, found = by_equation(known, origin, direction), known.met(origin, direction)
     both = np.isfinite(right) & np.isfinite(found)
     assert (np.isfinite(right) != np.isfinite(found)).sum() <= 4
     assert both.sum() > 200
     np.testing.assert_allclose(found[both], right[both], atol=1e-7)
 
 
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_it_holds(kind: str) -> None:
-    solids.check_inside(KINDS[kind])
+class TestCone(solids.AllChecks):
+    KINDS: ClassVar = KINDS
+    JOINED: ClassVar = {
+        "bucket": KINDS["bucket"],
+        "tip": cone(1.0, 0.0, 1.8),
+        "uneven": cone(0.8, 0.3, 1.4, scale=[1.5, 1.0, 0.8]),
+    }
+    GLASS: ClassVar = ("tip", "bucket")
+    LAMPS: ClassVar = ("tip", "bucket", "flat", "uneven")
+    POINTS: ClassVar = {
+        "over": [0.2, 0.1, 5.0],
+        "below": [0.3, -0.1, -2.0],
+        "beside": [-2.5, 0.4, 0.2],
+        "close": [1.05, 0.2, 0.3],
+        "far": [20.0, -30.0, 25.0],
+    }
 
-
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", None), ("float32", 1), ("float64", 4)))
-@pytest.mark.parametrize("kind", KINDS)
-def test_it_is_where_its_equation_is_zero(
-    kind: str, camera: str, precision: Precision, lanes: int | None
-) -> None:
-    solids.check_alone(KINDS[kind], device(), camera, precision, lanes)
-
-
-@pytest.mark.parametrize("kind", ["tip", "bucket", "straight"])
-def test_a_ray_from_within_meets_its_wall(kind: str) -> None:
-    known = solids.Known(KINDS[kind].values, KINDS[kind].own, [0, 0, 0], [0, 0, 0])
-    solids.check_walls(known, device(), [0.05, -0.1, -0.2])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_plane_opens_it(kind: str) -> None:
-    solids.check_opened(KINDS[kind], device())
-
-
-@pytest.mark.parametrize("join", ["cut", "intersection"])
-@pytest.mark.parametrize(
-    "known",
-    [cone(1.0, 0.0, 1.8), KINDS["bucket"], cone(0.8, 0.3, 1.4, scale=[1.5, 1.0, 0.8])],
-    ids=["tip", "bucket", "uneven"],
-)
-def test_it_is_joined_to_the_set(known: solids.Known, join: str) -> None:
-    solids.check_joined(known, device(), join)
-
-
-@pytest.mark.parametrize("join", ["union", "cut", "intersection"])
-def test_its_voxels(join: str) -> None:
-    solids.check_voxels(KINDS["bucket"], join)
-
-
-@pytest.mark.parametrize(
-    ("kind", "roughness"), one_of(("tip", 0.0), ("bucket", 0.0), ("tip", 0.5), ("bucket", 0.5))
-)
-def test_glass_is_not_seen_before_white(kind: str, roughness: float) -> None:
-    solids.check_glass(KINDS[kind], roughness)
-
-
-# Of its half axes: over it, below it, beside it, close to its side, and far.
-POINTS = ([0.2, 0.1, 5.0], [0.3, -0.1, -2.0], [-2.5, 0.4, 0.2], [1.05, 0.2, 0.3], [20.0, -30.0, 25.0])
-
-
-@pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", 8), ("float32", 1), ("float64", 8)))
-@pytest.mark.parametrize("point", POINTS, ids=["over", "below", "beside", "close", "far"])
-@pytest.mark.parametrize("kind", ["tip", "bucket", "flat", "uneven"])
-def test_even_light_is_found_in_all_directions(
-    kind: str, point: list[float], precision: Precision, lanes: int
-) -> None:
-    solids.check_choices(KINDS[kind], point, precision, lanes)
+    @pytest.mark.parametrize("kind", ["tip", "bucket", "straight"])
+    def test_a_ray_from_within_meets_its_wall(self, kind: str, device: Device) -> None:
+        solids.check_walls(still(KINDS[kind]), device, [0.05, -0.1, -0.2])
 
 
 def seen_angle(known: solids.Known, point: Floats) -> tuple[float, float]:
@@ -157,7 +121,7 @@ def seen_angle(known: solids.Known, point: Floats) -> tuple[float, float]:
 @pytest.mark.parametrize("kind", ["tip", "flat"])
 def test_on_its_axis_it_shines_as_a_disc(kind: str, away: float) -> None:
     """Its rim is what is seen: pi R^2 / (R^2 + d^2) for radiance 1, d from the lid."""
-    known = solids.Known(KINDS[kind].values, KINDS[kind].own, [0, 0, 0], [0, 0, 0])
+    known = still(KINDS[kind])
     radius, top, height = (known.values[key] for key in ("radius", "top", "height"))
     # (Where the upper lid does not hide the rim.)
     for z, far in ((height / 2 + away, height + away), (-height / 2 - away, away)):
@@ -169,7 +133,7 @@ def test_on_its_axis_it_shines_as_a_disc(kind: str, away: float) -> None:
 @pytest.mark.parametrize("kind", ["tip", "bucket", "straight"])
 def test_from_far_its_area_is_four_times_what_is_seen_of_it(kind: str) -> None:
     """Cauchy: the mean over all directions of a convex body's shadow is a fourth of its surface."""
-    known = solids.Known(KINDS[kind].values, KINDS[kind].own, [0, 0, 0], [0, 0, 0])
+    known = still(KINDS[kind])
     radius, top, height = (known.values[key] for key in ("radius", "top", "height"))
     area = math.pi * (radius**2 + top**2 + (radius + top) * math.hypot(height, radius - top))
     far, mean = 500.0, 0.0

@@ -2,24 +2,14 @@
 
 from __future__ import annotations
 
-import numpy as np
+from typing import ClassVar
 
-from tests.devices import device
 from tests.elements import solids
-from tests.render.joined_oracle import Floats
+from tests.render.joined_oracle import a_sphere
 
 
-def ball(points: Floats) -> Floats:
-    found: Floats = np.linalg.norm(points, axis=-1) - 0.7
-    return found
-
-
-SPHERE = solids.Known({"type": "sphere", "radius": 0.7}, ball)
-EGG = solids.Known({"type": "sphere", "radius": 0.7}, ball, scale=[1.4, 1.0, 0.6])
-
-
-def test_a_ball_and_an_egg() -> None:
-    for known in (SPHERE, EGG):
-        solids.check_inside(known)
-        solids.check_alone(known, device(), "perspective", "float32", None)
-        solids.check_opened(known, device())
+class TestSphere(solids.Checks):
+    KINDS: ClassVar = {
+        name: solids.Known({"type": "sphere", "radius": 0.7}, a_sphere([0, 0, 0], 0.7), scale=scale)
+        for name, scale in (("ball", [1.0, 1.0, 1.0]), ("egg", [1.4, 1.0, 0.6]))
+    }

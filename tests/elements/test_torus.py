@@ -2,96 +2,48 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
 
-from clfractal.device.structs import Precision
+from clfractal.device.select import Device
 from clfractal.elements.shapes.torus import TorusObject
 from clfractal.errors import SceneError
-from tests.devices import device
 from tests.elements import solids
-from tests.render.joined_oracle import Distance, Floats
-from tests.render.shots import CAMERAS
-from tests.variants import one_of
+from tests.render.joined_oracle import Floats
 
 
 def torus(radius: float, tube: float, **placed: Any) -> solids.Known:
     def distance(p: Floats) -> Floats:
-        found: Floats = np.hypot(np.hypot(p[..., 0], p[..., 1]) - radius, p[..., 2]) - tube
-        return found
+        return np.asarray(np.hypot(np.hypot(p[..., 0], p[..., 1]) - radius, p[..., 2]) - tube)
 
-    own: Distance = distance
-    return solids.Known({"type": "torus", "radius": radius, "tube": tube}, own, **placed)
+    return solids.Known({"type": "torus", "radius": radius, "tube": tube}, distance, **placed)
 
 
-KINDS = {
-    "tyre": torus(0.6, 0.35),
-    "ring": torus(0.8, 0.06),
-    "horn": torus(0.5, 0.5),
-    "uneven": torus(0.5, 0.2, scale=[1.6, 1.0, 0.6]),
-}
+class TestTorus(solids.AllChecks):
+    KINDS: ClassVar = {
+        "tyre": torus(0.6, 0.35),
+        "ring": torus(0.8, 0.06),
+        "horn": torus(0.5, 0.5),
+        "uneven": torus(0.5, 0.2, scale=[1.6, 1.0, 0.6]),
+    }
+    JOINED: ClassVar = {"tyre": KINDS["tyre"], "uneven": torus(0.6, 0.4, scale=[1.5, 1.0, 0.8])}
+    GLASS: ClassVar = ("tyre", "ring")
+    LAMPS: ClassVar = ("tyre", "ring", "uneven")
+    POINTS: ClassVar = {
+        "over": [0.2, 0.1, 6.0],
+        "beside": [-2.5, 0.4, 0.2],
+        "in the hole": [0.05, -0.03, 0.1],
+        "close": [0.8, 0.2, 1.4],
+        "far": [20.0, -30.0, 25.0],
+    }
 
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_what_it_holds(kind: str) -> None:
-    solids.check_inside(KINDS[kind])
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-@pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", None), ("float32", 1), ("float64", 4)))
-@pytest.mark.parametrize("kind", KINDS)
-def test_it_is_where_its_equation_is_zero(
-    kind: str, camera: str, precision: Precision, lanes: int | None
-) -> None:
-    solids.check_alone(KINDS[kind], device(), camera, precision, lanes)
-
-
-def test_a_ray_through_its_middle_and_along_its_plane() -> None:
-    """Along the axis nothing is met."""
-    known = torus(0.8, 0.2, rotation=[0, 0, 0], position=[0, 0, 0])
-    solids.check_alone(known, device(), "perspective", "float32", None)
-    solids.check_walls(known, device(), [0.8, 0, 0])
-
-
-@pytest.mark.parametrize("kind", KINDS)
-def test_a_plane_opens_it(kind: str) -> None:
-    """Also where the first part of a ray within is taken away, and the second is not."""
-    solids.check_opened(KINDS[kind], device())
-
-
-@pytest.mark.parametrize("join", ["cut", "intersection"])
-@pytest.mark.parametrize(
-    "known", [KINDS["tyre"], torus(0.6, 0.4, scale=[1.5, 1.0, 0.8])], ids=["tyre", "uneven"]
-)
-def test_it_is_joined_to_the_set(known: solids.Known, join: str) -> None:
-    solids.check_joined(known, device(), join)
-
-
-@pytest.mark.parametrize("join", ["union", "cut", "intersection"])
-def test_its_voxels(join: str) -> None:
-    solids.check_voxels(KINDS["tyre"], join)
-
-
-@pytest.mark.parametrize(
-    ("kind", "roughness"), one_of(("tyre", 0.0), ("ring", 0.0), ("tyre", 0.5), ("ring", 0.5))
-)
-def test_glass_is_not_seen_before_white(kind: str, roughness: float) -> None:
-    solids.check_glass(KINDS[kind], roughness)
-
-
-# Of its half axes: over it, beside it, in the middle of its hole, close to the tube, and far.
-POINTS = ([0.2, 0.1, 6.0], [-2.5, 0.4, 0.2], [0.05, -0.03, 0.1], [0.8, 0.2, 1.4], [20.0, -30.0, 25.0])
-
-
-@pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", 8), ("float32", 1), ("float64", 8)))
-@pytest.mark.parametrize("point", POINTS, ids=["over", "beside", "in the hole", "close", "far"])
-@pytest.mark.parametrize("kind", ["tyre", "ring", "uneven"])
-def test_even_light_is_found_in_all_directions(
-    kind: str, point: list[float], precision: Precision, lanes: int
-) -> None:
-    solids.check_choices(KINDS[kind], point, precision, lanes)
+    def test_a_ray_through_its_middle_and_along_its_plane(self, device: Device) -> None:
+        """Along the axis nothing is met."""
+        known = torus(0.8, 0.2, rotation=[0, 0, 0], position=[0, 0, 0])
+        solids.check_alone(known, device, "perspective", "float32", None)
+        solids.check_walls(known, device, [0.8, 0, 0])
 
 
 def test_a_tube_that_leaves_no_ring_is_refused() -> None:

@@ -15,7 +15,7 @@ CASES = cases(
     """
 # Blends and maps.
 materials: {m: {blend: [a, m]}, a: {}} => materials.m.blend: is made of itself: m -> m
-materials: {m: {blend: [a, b]}, a: {}, b: {blend: [m, a]}} => materials.b.blend: is made of itself: b -> m -> b
+materials: {m: {blend: [a, b]}, a: {}, b: {blend: [m, a]}} => materials.m.blend: is made of itself: m -> b -> m
 materials: {m: {blend: [rok, m]}, rock: {}} => blend.0: unknown material 'rok'; did you mean 'rock'?
 materials: {m: {blend: [m]}} => materials.m.blend: must have at least 2 entries, got 1
 materials: {m: {blend: [a, a], base: {weight: 0.5}}, a: {}} => m.base: cannot be combined with blend
@@ -37,9 +37,9 @@ materials: {m: {base: {weight: {by: normal, curve: [[0.5, 0], [0.2, 1]]}}}}
 materials: {m: {base: {weight: {by: hight}}}} => did you mean 'height'?
 materials: {m: {base: {weight: thick}}} => materials.m.base.weight: must be a number, got 'thick'
 materials: {m: {base: {color: {texture: none.png}}}}
-=> materials.m.base.color.texture: none.png cannot be read: No such file
+=> none.png cannot be read: No such file
 materials: {m: {base: {color: {texture: text.png}}}}
-=> materials.m.base.color.texture: text.png is no picture, or a damaged one
+=> text.png is no picture, or a damaged one
 materials: {m: {base: {color: {texture: ../x.png}}}}
 => materials.m.base.color.texture: must be a path inside the scene's folder, got '../x.png'
 # Reliefs.
@@ -51,7 +51,7 @@ materials: {m: {bump: {height: §{}}}} => materials.m.bump.height: needs one of 
 materials: {m: {bump: {height: {by: trap, curve: [[0, 0], [1, §-2e6]]}}}}
 => materials.m.bump.height.curve.1.1: must be at least -1e+06, got -2e+06
 materials: {m: {bump: {height: {texture: §none.png}}}}
-=> materials.m.bump.height.texture: none.png cannot be read: No such file or directory
+=> none.png cannot be read: No such file or directory
 materials: {m: {bump: {height: {by: trap}}}}
 objects: {b: {material: m}}
 => objects.b.material: 'm' differs from place to place, which needs lighting.mode: path
