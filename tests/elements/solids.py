@@ -240,7 +240,7 @@ class Checks:
 
     def pytest_generate_tests(self, metafunc: pytest.Metafunc) -> None:
         """A test has an argument of each table or list of its class, by the name in small letters."""
-        for name in {"KINDS", "JOINED", "GLASS", "LAMPS", "POINTS"} & set(dir(self)):
+        for name in ("KINDS", "JOINED", "GLASS", "LAMPS", "POINTS"):
             if name.lower() in metafunc.fixturenames:
                 given = getattr(self, name)
                 values = given.values() if isinstance(given, dict) else given

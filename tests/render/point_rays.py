@@ -17,7 +17,7 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render import normals_oracle as oracle
 from tests.render.normals_oracle import unit
-from tests.render.sequence import hashed, truth
+from tests.render.sequence import stochastic_points
 from tests.render.shots import (
     CAMERAS,
     SOLIDS,
@@ -64,20 +64,8 @@ def offsets(pattern: str, seed: int) -> tuple[Floats, Floats]:
         below, across = np.meshgrid(steps, steps, indexing="ij")
         shape = (SIDE, SIDE, COUNT)
         return np.broadcast_to(across.ravel(), shape), np.broadcast_to(below.ravel(), shape)
-    # One in each strip, a golden section further along it than the last; strips upright or level, mirrored or not.
     y, x = np.indices((SIDE, SIDE))
-    pixel = truth(x, y, np.zeros_like(x), seed, 1)[2][..., None]
-    golden, digits, point = 0x9E3779B9, 2**32, np.arange(COUNT, dtype=np.uint64)
-    first = hashed(pixel)
-    turn = hashed(first)
-    within = hashed((pixel + golden * (point + 1)) % digits)
-    along = (digits - 1) // COUNT * point + within // COUNT
-    along = np.where(turn & 1, digits - 1 - along, along)
-    other = (first + golden * point) % digits
-    level = (turn >> 1 & 1).astype(bool)
-    places = [np.where(level, other, along), np.where(level, along, other)]
-    across, below = ((place >> 9) / 2.0**23 + 2.0**-24 - 0.5 for place in places)
-    return across, below
+    return stochastic_points(x, y, COUNT, seed)
 
 
 @dataclass(frozen=True)

@@ -64,3 +64,20 @@ def unit_squares(width: int, height: int, count: int, seed: int, purpose: int = 
     y, x, index = np.indices((height, width, count))
     first, second, _ = truth(x, y, index, seed, purpose)
     return (first >> 9) / 2.0**23 + 2.0**-24, (second >> 9) / 2.0**23 + 2.0**-24
+
+
+def stochastic_points(x: Array, y: Array, count: int, seed: int) -> tuple[Array, Array]:
+    """Pixels' points: one in each strip, a golden section further along it than the last; strips upright or level, mirrored
+    or not. Pixels right and down from the centre, shape (..., count)."""
+    pixel = truth(x, y, np.zeros_like(x), seed, 1)[2][..., None]
+    golden, digits, point = 0x9E3779B9, 2**32, np.arange(count, dtype=np.uint64)
+    first = hashed(pixel)
+    turn = hashed(first)
+    within = hashed((pixel + golden * (point + 1)) % digits)
+    along = (digits - 1) // count * point + within // count
+    along = np.where(turn & 1, digits - 1 - along, along)
+    other = (first + golden * point) % digits
+    level = (turn >> 1 & 1).astype(bool)
+    places = [np.where(level, other, along), np.where(level, along, other)]
+    across, below = ((place >> 9) / 2.0**23 + 2.0**-24 - 0.5 for place in places)
+    return across, below

@@ -10,7 +10,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from clfractal.shading.emitters import sampled_radiance
-from tests.render.objects_oracle import NOWHERE, rotation_of
+from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import Floats, points_of, shoot, stacked
 from tests.scenes import scene_of
 from tests.variants import one_of
@@ -72,51 +72,9 @@ def colors(scene: Scene, device: Device, **settings: Any) -> Floats:
     return stacked(shoot(scene, device, **settings), ("R", "G", "B")).astype(float)
 
 
-def places_of(name: str) -> tuple[Floats, Floats, Floats]:
-    """Places all over a lamp, their normals, and areas."""
-    at = LAMPS[name]
-    turn, scale = rotation_of(TURNS[name]), np.array(at.get("scale", [1.0, 1, 1]))
-    if at["type"] == "box":
-        x, y = (each.ravel() for each in np.meshgrid(*[(np.arange(40) + 0.5) / 20 - 1] * 2))
-        parts, normals, areas = [], [], []
-        for axis in range(3):
-            for side in (-1.0, 1.0):
-                place = np.insert(np.stack([x, y], axis=1), axis, side, axis=1)
-                half = np.array(at["size"]) / 2
-                parts.append(place * half)
-                normals.append(np.broadcast_to(side * np.eye(3)[axis], place.shape))
-                areas.append(np.full(len(x), 4 * np.prod(np.delete(half, axis)) / len(x)))
-    else:
-        u, v = (
-            each.ravel() for each in np.meshgrid((np.arange(120) + 0.5) / 120, (np.arange(80) + 0.5) / 80)
-        )
-        around = np.stack([np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)], axis=1)
-        sx, sy = at["radius"] * scale[:2]
-        sz = at["height"] / 2 * scale[2]
-        normal = np.concatenate([around * [sy, sx], np.zeros((len(u), 1))], axis=1)
-        arc = np.linalg.norm(normal, axis=1)
-        parts = [np.concatenate([around * [sx, sy], (sz * (2 * v - 1))[:, None]], axis=1)]
-        normals = [normal / arc[:, None]]
-        areas = [arc * 2 * np.pi * 2 * sz / len(u)]
-        for side in (-1.0, 1.0):
-            disc = np.sqrt(v)[:, None] * around * [sx, sy]
-            parts.append(np.concatenate([disc, np.full((len(u), 1), side * sz)], axis=1))
-            normals.append(np.broadcast_to([0, 0, side], (len(u), 3)))
-            areas.append(np.full(len(u), np.pi * sx * sy / len(u)))
-    middle = np.array(at["position"])
-    return middle + np.concatenate(parts) @ turn.T, np.concatenate(normals) @ turn.T, np.concatenate(areas)
-
-
-def irradiance(name: str, points: Floats) -> Floats:
-    """Over pi, of places on the floor: the sum over all places of a lamp that face them."""
-    places, normals, areas = places_of(name)
-    found = np.empty(len(points))
-    for index, point in enumerate(points):
-        way = places - point
-        square = (way**2).sum(axis=1)
-        facing = np.maximum(-(way * normals).sum(axis=1), 0) * np.maximum(way[:, 2], 0)
-        found[index] = (facing / square**2 * areas).sum() / np.pi
-    return found
+def blocks(picture: Floats) -> Floats:
+    """Means of blocks of 6 x 6 pixels."""
+    return np.asarray(picture.reshape(4, 6, 4, 6, -1).mean(axis=(1, 3)))
 
 
 def test_a_ball_is_what_a_light_of_its_size_is(device: Device) -> None:
@@ -130,20 +88,15 @@ def test_a_ball_is_what_a_light_of_its_size_is(device: Device) -> None:
     np.testing.assert_allclose(one, other, atol=2e-5)
 
 
-@pytest.mark.parametrize("name", ["ball", "box", "panel", "drum", "tube"])
-def test_the_floor_has_the_irradiance_of_quadrature(device: Device, name: str) -> None:
-    framebuffer = shoot(lit({"it": lamp(name)}, 256), device)
+def test_the_floor_has_the_irradiance_of_a_ball(device: Device) -> None:
+    framebuffer = shoot(lit({"it": lamp("ball")}, 256), device)
     found, points = stacked(framebuffer, ("R", "G", "B")).astype(float), points_of(framebuffer).reshape(-1, 3)
     assert np.abs(points[:, 2]).max() < 1e-3
-    if name == "ball":
-        way = np.array(LAMPS["ball"]["position"]) - points
-        square = (way**2).sum(axis=1)
-        right = 0.3**2 / square * way[:, 2] / np.sqrt(square)  # Wholly above the horizon.
-    else:
-        right = irradiance(name, points)
+    way = np.array(LAMPS["ball"]["position"]) - points
+    square = (way**2).sum(axis=1)
+    right = 0.3**2 / square * way[:, 2] / np.sqrt(square)  # Wholly above the horizon.
     assert found.mean(axis=(0, 1)) == pytest.approx(6 * COLOR * right.mean(), rel=0.005)
-    parts = found[..., 0].reshape(4, 6, 4, 6).mean(axis=(1, 3))
-    np.testing.assert_allclose(parts, 6 * right.reshape(4, 6, 4, 6).mean(axis=(1, 3)), rtol=0.01)
+    np.testing.assert_allclose(blocks(found[..., 0]), 6 * blocks(right.reshape(24, 24)), rtol=0.01)
 
 
 # Large lamps of all kinds, one half hidden by another, near a gloss and a metal; and a dull one that is lit by others.
@@ -185,7 +138,7 @@ def test_asking_and_chance_agree(device: Device) -> None:
         colors(among_many(BY_CHANCE, 2048, bounces=4), device),
     )
     assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.005)
-    one, other = (each.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) for each in (asked, chance))
+    one, other = (blocks(each) for each in (asked, chance))
     np.testing.assert_allclose(one, other, rtol=0.04, atol=0.004)
 
 
@@ -233,7 +186,7 @@ def test_a_room_that_shines_and_reflects_half_is_white(device: Device, name: str
     scene = lit(objects, 64, 24, camera, materials={**MATERIALS, "white": half, "glow": half})
     found = colors(scene, device)
     assert found.mean() == pytest.approx(1, abs=0.002)
-    assert np.abs(found.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) - 1).max() < 0.02
+    assert np.abs(blocks(found) - 1).max() < 0.02
 
 
 def test_the_eye_and_mirrors_see_the_whole_of_it(device: Device) -> None:
@@ -337,5 +290,5 @@ def test_lamps_in_glass_and_under_water(device: Device) -> None:
 
     asked, chance = picture(GLOW, 256, 7), picture(BY_CHANCE, 1024, 8)
     assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
-    one, other = (each.reshape(4, 6, 4, 6, 3).mean(axis=(1, 3)) for each in (asked, chance))
+    one, other = (blocks(each) for each in (asked, chance))
     np.testing.assert_allclose(one, other, rtol=0.08, atol=0.01)

@@ -87,30 +87,6 @@ def toward(across: Floats, below: Floats) -> Floats:
     return np.stack([level * np.sin(longitude), level * np.cos(longitude), np.sin(latitude)], axis=-1)
 
 
-def test_which_way_is_where() -> None:
-    """A map that is red ahead (+y), green to the right (+x), blue above, and grey behind."""
-    pixels = np.zeros((64, 128, 3), np.float32)
-    pixels[20:44, 60:68] = (1, 0, 0)
-    pixels[20:44, 92:100] = (0, 1, 0)
-    pixels[:8] = (0, 0, 1)
-    pixels[20:44, :4] = pixels[20:44, -4:] = 0.5
-    directions = np.array([[0, 1, 0], [1, 0, 0], [0, 0, 1], [0, -1, 0], [-1, 0, 0], [0, 0, -1]], float)
-    found = ask(pack_environment(pixels), directions).color
-    expected = [[1, 0, 0], [0, 1, 0], [0, 0, 1], [0.5, 0.5, 0.5], [0, 0, 0], [0, 0, 0]]
-    np.testing.assert_allclose(found, np.array(expected), atol=1e-5)
-
-
-def test_the_map_turns_counterclockwise_seen_from_above() -> None:
-    """By 90 degrees, what was ahead (+y) is on the left (-x)."""
-    pixels = np.zeros((32, 64, 3), np.float32)
-    pixels[12:20, 30:34] = 1
-    settings = settings_of(rotation=90.0, intensity=2.0)
-    found = ask(
-        pack_environment(pixels), np.array([[-1, 0, 0], [1, 0, 0], [0, 1, 0]], float), settings=settings
-    )
-    np.testing.assert_allclose(found.color[:, 0], [2, 0, 0], atol=1e-5)
-
-
 @every_variant
 def test_light_is_blended_between_pixels(precision: Precision, lanes: int) -> None:
     check_usable(precision, lanes)
@@ -124,19 +100,6 @@ def test_light_is_blended_between_pixels(precision: Precision, lanes: int) -> No
         found.color[usual], expected[usual], atol=2e-3 if precision == "float32" else 1e-5
     )
     assert np.isfinite(found.color).all()
-
-
-def test_pixels_are_met_at_their_middles() -> None:
-    pixels = a_map()
-    across, below = np.meshgrid((np.arange(32) + 0.5) / 32, (np.arange(16) + 0.5) / 16)
-    found = ask(pack_environment(pixels), toward(across, below).reshape(-1, 3))
-    np.testing.assert_allclose(found.color, pixels.reshape(-1, 3), atol=5e-4)
-
-
-def test_there_is_no_seam() -> None:
-    below = np.linspace(0.02, 0.98, 200)
-    sides = [ask(pack_environment(a_map()), toward(np.full(200, x), below)).color for x in (1e-6, 1 - 1e-6)]
-    np.testing.assert_allclose(sides[0], sides[1], atol=5e-3)
 
 
 @pytest.mark.parametrize(
@@ -200,24 +163,6 @@ def test_a_sample_knows_its_density(precision: Precision, lanes: int) -> None:
     again = ask(packed, found.sample, None, **options)
     # Rounding may carry one at a border into the next cell.
     assert (again.density == found.sample_density).mean() > 0.999
-
-
-@pytest.mark.parametrize("rotation", [0.0, 77.0])
-def test_light_is_found_by_samples(rotation: float) -> None:
-    """The mean of light over density is the integral, and importance makes it less noisy than chance."""
-    pixels = a_map()
-    packed, settings = pack_environment(pixels), settings_of(rotation=rotation)
-    count = 100_000
-    chosen = ask(packed, None, np.random.default_rng(5).random((count, 2)), settings=settings)
-    light = ask(packed, chosen.sample, settings=settings).color @ LUMINANCE
-    weights = light / chosen.sample_density
-    directions = random_directions(count, 6)
-    uniform = ask(packed, directions, settings=settings).color @ LUMINANCE * 4 * np.pi
-    across, below = np.meshgrid((np.arange(640) + 0.5) / 640, (np.arange(320) + 0.5) / 320)
-    area = np.cos((0.5 - below) * np.pi).reshape(-1) * (np.pi / 320) * (2 * np.pi / 640)
-    exact = (blended(pixels.astype(float), across.reshape(-1), below.reshape(-1)) @ LUMINANCE * area).sum()
-    assert abs(weights.mean() - exact) < 4.5 * weights.std() / math.sqrt(count) + 1e-3 * exact
-    assert weights.std() < 0.4 * uniform.std()
 
 
 @pytest.mark.parametrize("pixels", [spots(), a_map(), spots(700)], ids=["spots", "random", "reduced"])

@@ -161,26 +161,3 @@ def test_what_touches_a_pixel_is_proved(device: Device) -> None:
     assert not (middle & ~hit).any()
     # At rims a ray may pass within `detail` of the solid, beside all 64: 71 pixels.
     assert (hit & ~covered).sum() < 0.06 * covered.sum()
-
-
-def test_the_search_for_inside_points(device: Device) -> None:
-    """It finds what is there, in a corner of a pixel's column, and finds nothing where nothing is."""
-    chain = scene_of(FORMULA, {"position": [0, 0, 3], "up": [0, 1, 0]}).chain
-    rim = np.array([0.25 + 0.0009]), np.array([0.0])  # the cardioid ends at 1/4, inside the pixel's left part
-    found = point_inside(chain, device, *rim, np.array([0.0]), 0.003)
-    assert found is not None
-    assert abs(found[0] - 0.2509) <= 0.0015
-    assert abs(found[1]) <= 0.0015
-    for column, row in ((0.6, 0.6), (-1.2525, 0.2895), (-2.01, 0.0)):
-        assert (
-            point_inside(chain, device, np.array([column]), np.array([row]), np.array([0.0]), 0.003) is None
-        )
-
-
-def test_components() -> None:
-    picture = np.array([[1, 0, 0, 1], [0, 1, 0, 0], [0, 0, 0, 1], [1, 0, 0, 1]], bool)
-    labels, sizes = components(picture)
-    assert sizes.tolist() == [2, 2, 1, 1]
-    assert labels[0, 0] == labels[1, 1]
-    assert labels[2, 3] == labels[3, 3] != labels[0, 3]
-    assert (labels[~picture] == 0).all()

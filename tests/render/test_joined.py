@@ -9,7 +9,6 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.integrators.surface import program_texts
 from tests.render.joined_oracle import (
     PLACED,
     SCALE,
@@ -31,11 +30,9 @@ from tests.render.shots import (
     QUICK_BALL,
     SOLIDS,
     normals_of,
-    plan_of,
     points_of,
     rays,
     shoot,
-    shoot_whole,
 )
 from tests.scenes import scene_of
 from tests.variants import one_of
@@ -224,36 +221,3 @@ def test_along_paths_it_has_the_same_light(device: Device) -> None:
     first, second = (shoot(scene, device, samples=64) for scene in (alone, joined))
     for channel in "RGB":
         assert second[channel].mean() == pytest.approx(first[channel].mean(), rel=0.03)
-
-
-def test_both_eyes_and_all_views_of_it(device: Device) -> None:
-    views = [{"camera": PERSPECTIVE}, {"renderer": {"type": "cut_plane"}}]
-    scene = scene_of(
-        BALL,
-        {"position": [0, -4, 0.5], "fov": 40},
-        (96, 48),
-        objects={"hole": {**SIMPLE["sphere"][0], "join": "cut"}},
-        layout={"columns": 2, "views": views},
-    )
-    framebuffer = shoot_whole(scene, device)
-    whole = shoot_whole(scene_of(BALL, PERSPECTIVE, (48, 48), objects={}), device)
-    left = framebuffer["Z"][:, :48]
-    seen = np.isfinite(left) & np.isfinite(whole["Z"])
-    assert (left[seen] - whole["Z"][seen] > 0.2).sum() > 20, "the hole is seen"
-    assert (framebuffer["A"][:, 50:] == 1).all()
-
-
-def test_a_moving_formula_compiles_once(device: Device) -> None:
-    formula = {"name": "mandelbulb", "iterations": 5, "live": ["power"]}
-
-    def texts(power: float, scale: float) -> list[str]:
-        twin = {"type": "formula", "formula": {**formula, "parameters": {"power": power}}, "scale": scale}
-        scene = scene_of(BALL, PERSPECTIVE, objects={"twin": {**twin, "position": [1, scale, 0]}})
-        return [text.flat.text for text in program_texts(scene, plan_of(scene, device))]
-
-    assert texts(4.0, 0.5) == texts(7.5, 0.8)
-    one = {"type": "formula", "formula": formula}
-    both = scene_of(formula, PERSPECTIVE, objects={"a": one, "b": {**one, "position": [3, 0, 0]}})
-    march = program_texts(both, plan_of(both, device))[0].flat.text
-    assert "leaf_0_apply(" in march
-    assert "leaf_1_apply(" not in march, "equal texts are one"

@@ -9,8 +9,6 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.integrators.surface import program_texts
-from clfractal.scene.movement import movement_of
 from tests.render.objects_oracle import NOWHERE, met
 from tests.render.shots import (
     BALL,
@@ -18,7 +16,6 @@ from tests.render.shots import (
     PERSPECTIVE,
     QUICK_BALL,
     normals_of,
-    plan_of,
     points_of,
     rays,
     shoot,
@@ -238,26 +235,3 @@ def test_an_object_hides_the_face_of_a_cut(device: Device, points: int) -> None:
     face = (framebuffer["A"] == 1) & (framebuffer["Z"] > 2.6)
     assert face.sum() > 200
     np.testing.assert_allclose(framebuffer["Z"][face], 4, atol=0.05)
-
-
-def test_a_moving_object_keeps_its_program(device: Device) -> None:
-    tracks = {
-        "objects.ball.position": {
-            "keys": [{"frame": 0, "value": [0, 0, 0]}, {"frame": 9, "value": [1, 0, 1]}]
-        },
-        "objects.ball.radius": {"keys": [{"frame": 0, "value": 0.1}, {"frame": 9, "value": 0.4}]},
-        "objects.sea.waves.time": {"expression": "t"},
-    }
-    scene = scene_of(
-        BALL,
-        PERSPECTIVE,
-        objects={"ball": {"type": "sphere", "radius": 0.2}, "sea": {"type": "water", "position": [0, 0, -2]}},
-        animation={"fps": 10, "frames": 10, "tracks": tracks},
-    )
-    frames = [movement_of(scene).still(number) for number in (0, 9)]
-    texts = [[text.flat.text for text in program_texts(frame, plan_of(frame, device))] for frame in frames]
-    assert texts[0] == texts[1]
-    ball, sea = frames[1].objects.values()
-    assert ball.position == (1, 0, 1)
-    assert ball.radius == pytest.approx(0.4)  # type: ignore[attr-defined]
-    assert sea.waves.time == pytest.approx(0.9)  # type: ignore[attr-defined]

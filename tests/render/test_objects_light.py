@@ -138,31 +138,6 @@ def test_a_plane_has_the_irradiance_of_closed_forms(
     assert found.mean() == pytest.approx(right.mean(), rel=0.01)
 
 
-def test_ambient_occlusion_of_a_ball_over_a_plane(device: Device) -> None:
-    """A ball above the horizon takes (R/d)^2 cos(angle) of the cosine-weighted hemisphere (Nusselt 1928)."""
-    scene = scene_of(
-        NOWHERE,
-        FROM_ABOVE,
-        (40, 40),
-        objects={
-            name: {**each, "material": None} for name, each in (("floor", FLOOR), ("ball", BALL_OBJECT))
-        },
-        material={"color": [1, 1, 1], "ambient": 1, "diffuse": 0, "specular": 0},
-        lights=[{"type": "directional"}],
-        renderer={"samples": 4, "ambient_occlusion": {"rays": 64, "distance": 50}},
-    )
-    framebuffer = shoot(scene, device)
-    points = points_of(framebuffer)
-    on_floor = (np.abs(points[..., 2] + 0.5) < 1e-4) & (framebuffer["A"] == 1)
-    way = np.array(BALL_OBJECT["position"]) - points[on_floor]
-    distance = np.linalg.norm(way, axis=-1)
-    covered = 0.4**2 / distance**2 * way[:, 2] / distance
-    error = colors(framebuffer)[on_floor][:, 0] - (1 - covered)
-    assert covered.max() > 0.2
-    assert abs(error.mean()) < 0.003
-    assert np.abs(error).mean() < 0.02
-
-
 def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
     mirror = {"base": {"color": [1, 1, 1], "metalness": 1}, "specular": {"roughness": 0}}
     lamp = {

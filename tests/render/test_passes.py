@@ -19,7 +19,6 @@ from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
 from tests.render.passes import RENDERERS, SIZE, scene_with
 from tests.render.shots import CHANNELS, job_of, plan_of, shoot, stacked
-from tests.variants import one_of
 
 NOISY: dict[str, Any] = {"samples": 16, "noise": 0.02, "min_samples": 4}
 SPLITS = ((1, 1, 2, 12), (16,), (4, 4, 4, 4), (5, 11), (3, 1, 8, 4))
@@ -37,26 +36,28 @@ def in_passes(
         yield framebuffer
 
 
-@pytest.mark.parametrize("adaptive", [False, True])
-@pytest.mark.parametrize("kind", RENDERERS)
-def test_passes_have_the_bits_of_one(kind: str, adaptive: bool, device: Device) -> None:
-    scene = scene_with(kind, **(NOISY if adaptive else {}))
-    plan = plan_of(scene, device)
-    whole = stacked(shoot(scene, device))
-    if adaptive and kind != "cut_plane":
-        assert len(np.unique(whole[..., CHANNELS.index("samples")])) > 1
-    executor = LocalExecutor(device)
+@pytest.mark.parametrize(
+    ("kind", "precision", "channels", "settings"),
+    [
+        *((kind, "float32", CHANNELS, settings) for kind in RENDERERS for settings in ({}, NOISY)),
+        *((kind, "float64", CHANNELS, NOISY) for kind in ("surface", "cut_plane")),
+        ("surface", "float32", ("Z", "B"), NOISY),
+    ],
+)
+def test_passes_have_the_bits_of_one(
+    kind: str, precision: Precision, channels: tuple[str, ...], settings: dict[str, Any], device: Device
+) -> None:
+    scene = scene_with(kind, **settings)
+    plan = plan_of(scene, device, precision, channels=channels)
+    framebuffer = shoot(scene, device, precision)
+    if settings and kind != "cut_plane":
+        assert len(np.unique(framebuffer["samples"])) > 1
+    whole, executor = stacked(framebuffer, channels), LocalExecutor(device)
     for split in SPLITS:
         *_, last = in_passes(scene, plan, device, split, executor)
-        np.testing.assert_array_equal(stacked(last).view(np.uint32), whole.view(np.uint32), str(split))
-
-
-@pytest.mark.parametrize("kind", ["surface", "cut_plane"])
-def test_passes_of_float64(kind: str, device: Device) -> None:
-    scene = scene_with(kind, **NOISY)
-    plan = plan_of(scene, device, "float64")
-    *_, last = in_passes(scene, plan, device, (1, 1, 2, 12), LocalExecutor(device))
-    np.testing.assert_array_equal(stacked(last), stacked(shoot(scene, device, "float64")))
+        np.testing.assert_array_equal(
+            stacked(last, channels).view(np.uint32), whole.view(np.uint32), str(split)
+        )
 
 
 def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
@@ -71,36 +72,6 @@ def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
     assert np.abs(framebuffers[0]["R"] - framebuffers[-1]["R"]).max() > 0.01
 
 
-@pytest.mark.parametrize("budget", one_of(1e-3, 1e-7))
-@pytest.mark.parametrize("kind", RENDERERS)
-def test_tiles_in_parts_have_the_same_bits(
-    kind: str, budget: float, device: Device, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """So little time that a launch is one sample of one packet: packets and samples of a tile are split."""
-    scene = scene_with(kind, **NOISY)
-    plan = plan_of(scene, device)
-    spans: list[tuple[tuple[int, int], tuple[int, int]]] = []
-    from clfractal.engine.drawing import Drawing
-    from clfractal.engine.stages import Span
-
-    start = Drawing.start
-
-    def noted(self: Drawing, span: Span) -> object:
-        spans.append((span.packets, span.samples))
-        return start(self, span)
-
-    monkeypatch.setattr(Drawing, "start", noted)
-    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
-    executor = LocalExecutor(device, budget_seconds=budget)
-    state = run(job_of(scene, plan, device), [framebuffer], executor)
-    whole = shoot(scene, device)
-    np.testing.assert_array_equal(stacked(framebuffer), stacked(whole))
-    assert state.rays == whole["samples"].sum()
-    if budget < 1e-5:
-        assert any(samples[1] - samples[0] < 16 for _, samples in spans)
-        assert any(packets[1] - packets[0] < 1024 // plan.lanes for packets, _ in spans)
-
-
 def test_what_passes_keep_follows_from_the_channels(device: Device) -> None:
     """70 bytes a pixel with all channels and noise; colours alone need 16."""
     precision: Precision = "float32"
@@ -113,15 +84,6 @@ def test_what_passes_keep_follows_from_the_channels(device: Device) -> None:
         *("red", "green", "blue", "coverage", "samples"),
         *("brightness", "brightness_square", "coverage_square"),
     )
-
-
-def test_channels_that_are_not_wanted_change_nothing(device: Device) -> None:
-    scene = scene_with("surface", **NOISY)
-    plan = plan_of(scene, device, channels=("Z", "B"))
-    *_, last = in_passes(scene, plan, device, (1, 1, 2, 12), LocalExecutor(device))
-    whole = shoot(scene, device)
-    for name in ("Z", "B"):
-        np.testing.assert_array_equal(last[name], whole[name])
 
 
 @pytest.mark.parametrize("divider", [2, 4, 8])

@@ -15,6 +15,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.formulas import reference
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.plan import choose_precision
 from clfractal.scene.model import Scene
 from tests.render.planes import mandelbrot, sure
@@ -100,6 +101,17 @@ def layered(scene: Scene, renderer: str) -> tuple[Floats, Floats, npt.NDArray[np
     return color + through[..., None] * BACKGROUND, 1 - through, sure
 
 
+def check_layers(
+    framebuffer: Framebuffer, scene: Scene, renderer: str, least: float
+) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Gives the coverage, and where it is certain."""
+    color, coverage, sure = layered(scene, renderer)
+    assert sure.mean() > least
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
+    return coverage, sure
+
+
 @pytest.mark.parametrize("renderer", RENDERERS)
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("distance", [-1.3, -0.4, 1.3])
@@ -110,10 +122,7 @@ def test_one_quad(device: Device, renderer: str, camera: str, distance: float) -
     place = [float(x) for x in -distance * toward + [0.1, 0, 0.05]]
     scene = picture(renderer, CAMERAS[camera], [plane(place, [0.2, -1, 0.5], 0.7)])
     framebuffer = shoot(scene, device)
-    color, coverage, sure = layered(scene, renderer)
-    assert sure.mean() > 0.85
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
+    _, sure = check_layers(framebuffer, scene, renderer, 0.85)
     if distance > 0:
         return
     # The data channels tell of a quad that stops half of the light or more.
@@ -165,10 +174,7 @@ def test_several_quads_by_depth(device: Device, renderer: str, side: int) -> Non
     ]
     scene = picture(renderer, camera, planes)
     framebuffer = shoot(scene, device)
-    color, coverage, sure = layered(scene, renderer)
-    assert sure.mean() > 0.75
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
+    coverage, sure = check_layers(framebuffer, scene, renderer, 0.75)
     assert len(np.unique(np.round(coverage[sure], 4))) >= 4
 
 
@@ -182,10 +188,7 @@ def test_the_set_on_a_plane_has_its_own_opacity(
     planes = [plane([0.0, -1.0, 0.05], [0.1, -1, 0.1], outside, inside_opacity=inside, iterations=2)]
     scene = picture(renderer, PERSPECTIVE, planes, iterations=BALL_ITERATIONS)
     framebuffer = shoot(scene, device)
-    color, coverage, sure = layered(scene, renderer)
-    assert sure.mean() > 0.8
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
+    _, sure = check_layers(framebuffer, scene, renderer, 0.8)
     # A quad that stops half of the light or more is what the data channels tell of, where it does.
     seen, t, _ = met(scene, 0)
     origin, direction, _ = rays(scene)
@@ -213,10 +216,7 @@ def test_quads_at_one_distance(device: Device, renderer: str) -> None:
     ]
     scene = picture(renderer, PERSPECTIVE, planes)
     framebuffer = shoot(scene, device)
-    color, coverage, sure = layered(scene, renderer)
-    assert sure.mean() > 0.7
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=1e-5)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=2e-4)
+    coverage, sure = check_layers(framebuffer, scene, renderer, 0.7)
     assert {0.85, 0.91, 1.0} <= set(np.round(coverage[sure], 4).tolist())
 
 

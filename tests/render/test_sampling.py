@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from tests.render.sampler import Array, Sampler, samplers
-from tests.render.sequence import truth
+from tests.render.sequence import stochastic_points, truth
 
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 DIGITS = {"float32": 23, "float64": 31}
@@ -66,77 +66,7 @@ def test_every_elementary_interval_holds_one_point() -> None:
                     assert len(set((column * 2 ** (m - i) + row).tolist())) == 2**m
 
 
-def test_digits_are_flipped_independently() -> None:
-    # Over many seeds, any two points of the sequence fall on each pair of cells that a net allows equally often.
-    x, y = grid_of_pixels(128)
-    first, second = (samplers()[0].squares(x, y, np.array([index]))[0] for index in (0, 1))
-    for a, b in zip(first, second, strict=True):
-        assert ((a < 0.5) != (b < 0.5)).all()
-        cells = np.histogram2d(a, 2 * (b % 0.5), bins=[16, 8], range=[(0, 1)] * 2)[0]
-        assert stats.chisquare(cells.ravel()).pvalue > 1e-3
-    cells = np.histogram2d(first[0], first[1], bins=16)[0]
-    assert stats.chisquare(cells.ravel()).pvalue > 1e-3
-
-
-def star_discrepancy(points: Array) -> float:
-    """Exact, of points (2, n): the extreme boxes have their corners at coordinates of points, open or closed."""
-    u, v = (np.append(np.sort(axis), 1.0) for axis in points)
-    inside_closed = (points[0][:, None] <= u)[:, :, None] & (points[1][:, None] <= v)[:, None]
-    inside_open = (points[0][:, None] < u)[:, :, None] & (points[1][:, None] < v)[:, None]
-    area = u[:, None] * v
-    return float(max((inside_closed.mean(0) - area).max(), (area - inside_open.mean(0)).max()))
-
-
-def test_any_beginning_of_the_sequence_is_evenly_spread() -> None:
-    random = np.random.default_rng(5)
-    for count, part in ((12, 0.8), (64, 0.45), (100, 0.45), (128, 0.35)):
-        by_chance = np.mean([star_discrepancy(random.random((2, count))) for _ in range(8)])
-        worst = 0.0
-        for pixel in range(8):
-            # The count may be no multiple of the lanes.
-            points, _, _ = samplers()[0].squares(np.full(1, pixel), np.full(1, 9), np.arange(128))
-            worst = max(worst, star_discrepancy(points[:, :count]))
-        assert worst < part * by_chance
-
-
-def test_pixels_purposes_and_seeds_know_nothing_of_each_other() -> None:
-    x, y = grid_of_pixels(64)
-    sampler, n = samplers()[0], 64 * 64
-    index = np.array([0])
-    here = sampler.squares(x, y, index)[0]
-    others = {
-        "right": sampler.squares(x + 1, y, index)[0],
-        "below": sampler.squares(x, y + 1, index)[0],
-        "diagonal": sampler.squares(y, x, index)[0][:, x != y],
-        "purpose": sampler.squares(x, y, index, purpose=1)[0],
-        "light": sampler.squares(x, y, index, purpose=2)[0],
-        "seed": sampler.squares(x, y, index, seed=1)[0],
-        "far seed": sampler.squares(x, y, index, seed=0x9E3779B9)[0],
-    }
-    for name, there in others.items():
-        mine = here[:, x != y] if name == "diagonal" else here
-        correlation = np.corrcoef(np.concatenate([mine, there]))[:2, 2:]
-        assert np.abs(correlation).max() < 4.5 / math.sqrt(n), name
-        assert (mine == there).mean() < 0.01, name
-    assert abs(np.corrcoef(here)[0, 1]) < 4.5 / math.sqrt(n)
-
-
-def test_pixels_have_seeds_of_their_own() -> None:
-    # Of 2^18 random seeds some 8 pairs agree: more than 30 has a chance below 1e-8.
-    x, y = grid_of_pixels(512)
-    seeds = samplers()[0].squares(x, y, np.array([0]))[2]
-    assert len(seeds) - len(np.unique(seeds)) < 30
-    # No row of pixels is another one, shifted.
-    rows = [set(row.tolist()) for row in seeds.reshape(512, 512)]
-    assert max(len(rows[0] & row) for row in rows[1:]) < 4
-
-
 # Filters.
-
-
-def blackman_harris_density(t: Array) -> Array:
-    turns = 2 * np.pi * np.multiply.outer(np.arange(4), t)
-    return np.asarray(BLACKMAN_HARRIS @ np.cos(turns) / BLACKMAN_HARRIS[0])
 
 
 def blackman_harris_area(t: Array) -> Array:
@@ -193,27 +123,6 @@ def test_filter_places_of_0_and_1_are_the_edges() -> None:
             np.testing.assert_allclose(found[name], [(u - 0.5) * WIDTH] * 2, atol=2e-3 * WIDTH)
 
 
-@pytest.mark.parametrize("name", list(AREAS))
-def test_filter_offsets_have_the_filters_distribution(name: str) -> None:
-    t = (np.arange(20000) + 0.5) / 20000 - 0.5
-    density = {
-        "box": np.ones_like(t),
-        "tent": 2 - 4 * np.abs(t),
-        "blackman_harris": blackman_harris_density(t),
-    }
-    variance = WIDTH**2 * np.mean(density[name] * t**2)
-    fourth = WIDTH**4 * np.mean(density[name] * t**4)
-    for sampler in samplers():
-        (u, v), _, _ = sampler.squares(np.array([3]), np.array([4]), np.arange(4096))
-        for offsets in sampler.shapes(u, v, X_AXIS, np.zeros(1), WIDTH)[name]:
-            # One point lies in each 4096th of the area.
-            expected = AREAS[name](np.sort(offsets) / WIDTH)
-            assert np.abs(expected - (np.arange(4096) + 0.5) / 4096).max() < 0.51 / 4096
-            assert abs(offsets.mean()) < 1e-3
-            assert abs(offsets.var() / variance - 1) < 2e-3
-            assert abs((offsets**4).mean() / fourth - 1) < 5e-3
-
-
 # The points of a pixel.
 
 
@@ -230,69 +139,13 @@ def test_grid_is_exact(side: int) -> None:
         np.testing.assert_array_equal(steps, np.array([-1, 0, 1], np.float32) / np.float32(3))
 
 
-def nearest(points: Array) -> Array:
-    """The smallest distance between two points (count, 2, n) of each pixel, pixels."""
-    squares = ((points[:, None] - points[None]) ** 2).sum(2)
-    squares[np.arange(len(points)), np.arange(len(points))] = np.inf
-    return np.asarray(np.sqrt(squares.min((0, 1))))
-
-
-def jittered(side: int, pixels: int) -> Array:
-    below, across = np.divmod(np.arange(side * side), side)
-    corners = np.stack([across, below], 1)[:, :, None]
-    return (corners + np.random.default_rng(3).random((side * side, 2, pixels))) / side - 0.5
-
-
-@pytest.mark.parametrize("side", [2, 3, 8])
-def test_stochastic_points_are_spread_better_than_jittered_ones(side: int) -> None:
-    x, y = grid_of_pixels(32)
-    count = side * side
-    points, jitter = points_sampler().points(x, y, count), jittered(side, 1024)
-    # A hexagonal lattice has 1.07.
-    assert nearest(points).min() * side > 0.65
-    assert nearest(points).mean() > 1.25 * nearest(jitter).mean()
-    ours = [star_discrepancy(points[..., pixel].T + 0.5) for pixel in range(40)]
-    theirs = [star_discrepancy(jitter[..., pixel].T + 0.5) for pixel in range(40)]
-    assert np.mean(ours) < 0.95 * np.mean(theirs)
-
-
-@pytest.mark.parametrize("count", [4, 7, 64])
-def test_stochastic_points_are_everywhere_alike_and_unlike_in_neighbours(count: int) -> None:
+@pytest.mark.parametrize(("count", "seed"), [(4, 0), (7, 1), (64, 2**32 - 1)])
+def test_stochastic_points_are_those_of_the_sequence(count: int, seed: int) -> None:
     x, y = grid_of_pixels(64)
-    sampler = points_sampler()
-    points = sampler.points(x, y, count)
-    assert np.abs(points).max() < 0.5
-    # Over many pixels every part of a pixel gets its share: no picture is brighter for where its points lie.
-    cells = np.histogram2d(points[:, 0].ravel(), points[:, 1].ravel(), bins=16, range=[(-0.5, 0.5)] * 2)[0]
-    assert stats.chisquare(cells.ravel()).pvalue > 1e-3
-    for there in (sampler.points(x + 1, y, count), sampler.points(x, y, count, seed=1)):
-        for a, b in ((0, 0), (1, 1), (0, 1), (1, 0)):
-            assert abs(np.corrcoef(points[0, a], there[0, b])[0, 1]) < 4.5 / 64
-        # No pattern comes back: the means of a pixel's points, and so its errors, are unrelated.
-        mine, others = ((p[:, 0] * p[:, 1]).mean(0) for p in (points, there))
-        assert abs(np.corrcoef(mine, others)[0, 1]) < 4.5 / 64
-
-
-def test_stochastic_points_are_laid_out_in_four_ways() -> None:
-    x, y = grid_of_pixels(64)
-    strips = (points_sampler().points(x, y, 7) + 0.5) * 7
-    order = np.arange(7)[:, None, None]
-    upward, downward = (np.floor(strips) == order).all(0), (np.floor(strips) == 6 - order).all(0)
-    ways = np.concatenate([upward, downward])
-    np.testing.assert_array_equal(ways.sum(0), 1)
-    assert stats.chisquare(ways.sum(1)).pvalue > 1e-3
-    # Where in its strip a point lies has nothing to do with the next one's place.
-    within = strips[:, 0, upward[0]] % 1
-    correlation = np.corrcoef(within) - np.eye(7)
-    assert np.abs(correlation).max() < 4.5 / math.sqrt(within.shape[1])
-
-
-def test_points_do_not_depend_on_the_packet() -> None:
-    x, y = grid_of_pixels(8)
-    wide, *others = [each.points(x, y, 9) for each in samplers() if each.precision == "float32"]
-    assert others
-    for narrow in others:
-        np.testing.assert_array_equal(wide, narrow)
+    wanted = np.stack(stochastic_points(x, y, count, seed))
+    for sampler in samplers():
+        got = sampler.points(x, y, count, seed)
+        np.testing.assert_allclose(np.moveaxis(got, 0, -1), wanted, atol=2.0**-23)
 
 
 # Directions.

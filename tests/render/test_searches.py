@@ -16,10 +16,7 @@ import pytest
 
 from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
-from clfractal.formulas.backends import NumpyBackend
 from clfractal.formulas.catalog import names
-from clfractal.formulas.evaluate import evaluate
-from clfractal.formulas.reference import apply, constant_of, space_to_state
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
@@ -39,6 +36,7 @@ from tests.render.shots import (
     to_sphere,
 )
 from tests.scenes import scene_of
+from tests.voxels import grids
 
 Bools = npt.NDArray[np.bool_]
 
@@ -99,6 +97,13 @@ def scene_for(name: str, search: str, step: float | None = None) -> Scene:
     return scene_of(
         formula, camera, (SIDE, SIDE), lights=[], coloring={"by": "iterations"}, renderer=renderer
     )
+
+
+def inside(scene: Scene, points: Floats) -> Bools:
+    """Which points belong to the solid of the scene's applications within its bounds, in float64."""
+    center, radius = scene.bounds
+    bounded = np.linalg.norm(points - np.asarray(center), axis=-1) <= radius
+    return np.asarray(bounded & grids.inside(scene.chain, points, scene.formula.iterations))
 
 
 @dataclass(frozen=True)
@@ -324,31 +329,3 @@ def unexplained(near: Found, early: Bools) -> int:
         solid = inside(near.scene, points.reshape(-1, 3)).reshape(ball.shape[:2]).any(axis=1)
         left[left] = ~solid
     return int(left.sum())
-
-
-def inside(scene: Scene, points: Floats) -> Bools:
-    """Which points belong to the solid of the scene's applications within its bounds, in float64."""
-    backend, chain, iterations = NumpyBackend(), scene.chain, scene.formula.iterations
-    center, radius = scene.bounds
-    bounded = np.linalg.norm(points - np.asarray(center), axis=-1) <= radius
-    with np.errstate(all="ignore"):
-        columns = [np.ascontiguousarray(column) for column in points.T]
-        constant = [np.broadcast_to(p, columns[0].shape) for p in space_to_state(chain, columns, backend)]
-        state = [np.zeros_like(p) if chain.add == "point" else np.array(p) for p in constant]
-        alive = length(state) <= chain.distance_bailout
-        for n in range(iterations):
-            bound = chain.link_at(n).bound
-            new = apply(bound, state, constant_of(bound, constant), backend)
-            state = [np.where(alive, a, b) for a, b in zip(new, state, strict=True)]
-            alive &= length(state) <= chain.distance_bailout
-        bound = chain.links[-1].bound
-        if chain.degree > 1 or bound.formula.shape is None:
-            return np.asarray(bounded & alive & (length(state) <= chain.bailout))
-        names_known = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
-        for name, node in bound.formula.let:
-            names_known[name] = evaluate(node, names_known, backend)
-        return np.asarray(bounded & (evaluate(bound.formula.shape, names_known, backend) <= 0))
-
-
-def length(state: list[Floats]) -> Floats:
-    return np.asarray(np.sqrt(sum(z * z for z in state)))

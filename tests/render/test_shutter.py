@@ -169,15 +169,6 @@ def test_a_disk_that_crosses_the_picture_covers_its_way(engine: Engine) -> None:
     assert wanted.max() > 0.99
 
 
-def test_a_light_that_grows_gives_its_mean(engine: Engine) -> None:
-    """Light is linear, so a picture of parts is that of the mean intensity where nothing else differs."""
-    blurred = engine.render(clfractal.at_frame(film_of(DIMMING), 3), samples=16)
-    middle = engine.render(clfractal.at_frame(film_of(DIMMING, animation={"shutter": 0}), 3.25), samples=16)
-    inner = middle["A"] == 1
-    assert inner.sum() > 200
-    np.testing.assert_allclose(blurred["R"][inner], middle["R"][inner], rtol=0.02, atol=1e-3)
-
-
 def test_one_sample_has_the_scene_in_the_middle_of_the_time(engine: Engine) -> None:
     blurred = engine.render(clfractal.at_frame(film_of(DIMMING), 3), samples=1)
     same(

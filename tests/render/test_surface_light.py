@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,7 @@ from tests.render.shots import (
     SPHERE_CENTER,
     SPHERE_RADIUS,
     Floats,
+    colors,
     points_of,
     rays,
     shoot,
@@ -122,32 +122,32 @@ def test_no_acne(device: Device, formula: dict[str, Any], detail: float) -> None
             assert np.array_equal(pictures[0], pictures[1])
 
 
-def test_shadow_of_parallel_light(device: Device) -> None:
-    """On the box's top a point is dark exactly if its line to the light meets the sphere; footprints decide at the rim."""
-    direction = np.array([-0.5, 0.3, -1.0])
-    scene = scene_of(
-        SOLIDS, PERSPECTIVE, (240, 180), lights=[{"direction": direction.tolist()}], material=MATERIAL
-    )
+WAY = [-0.5, 0.3, -1.0]
+
+
+@pytest.mark.parametrize(
+    ("light", "casts"),
+    [
+        ({"direction": WAY}, True),
+        ({"type": "point", "position": [0.5, -0.3, 1.8]}, True),
+        ({"type": "point", "position": [0.2, -0.1, 0.4]}, False),
+    ],
+    ids=["parallel", "above", "between"],
+)
+def test_shadow_of_a_sphere(device: Device, light: dict[str, Any], casts: bool) -> None:
+    """On the box's top a point is dark exactly if its line to the light meets the sphere; footprints decide at the rim. A
+    light that stands between sphere and box casts no shadow of the sphere."""
+    scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
     framebuffer = shoot(scene, device)
     points, top = box_top(framebuffer)
-    toward = -direction / np.linalg.norm(direction)
-    _, passing = to_sphere(points, np.broadcast_to(toward, points.shape), SPHERE_CENTER, SPHERE_RADIUS)
-    check_shadow(framebuffer, scene, points, top, passing)
-
-
-def test_shadow_of_a_point_light(device: Device) -> None:
-    """The same from a light above; one that stands between sphere and box casts no shadow of the sphere."""
-    for position, casts in (([0.5, -0.3, 1.8], True), ([0.2, -0.1, 0.4], False)):
-        light = {"type": "point", "position": position}
-        scene = scene_of(SOLIDS, PERSPECTIVE, (240, 180), lights=[light], material=MATERIAL)
-        framebuffer = shoot(scene, device)
-        points, top = box_top(framebuffer)
-        toward = np.array(position) - points
-        toward /= np.linalg.norm(toward, axis=-1, keepdims=True)
-        _, passing = to_sphere(points, toward, SPHERE_CENTER, SPHERE_RADIUS)
-        check_shadow(
-            framebuffer, scene, points, top, passing if casts else np.full_like(passing, 9.0), some=casts
-        )
+    toward = (
+        light["position"] - points if "position" in light else np.broadcast_to(-np.array(WAY), points.shape)
+    )
+    toward = toward / np.linalg.norm(toward, axis=-1, keepdims=True)
+    _, passing = to_sphere(points, toward, SPHERE_CENTER, SPHERE_RADIUS)
+    check_shadow(
+        framebuffer, scene, points, top, passing if casts else np.full_like(passing, 9.0), some=casts
+    )
 
 
 def test_lights_without_shadow_shine_through(device: Device) -> None:
@@ -240,9 +240,3 @@ def eq5(scene: Scene, points: Floats, normals: Floats, directions: Floats, *, li
         added = (material.ambient + diffuse)[..., None] * body + specular[..., None]
         total += np.array(light.color) * strength[..., None] * added
     return total
-
-
-def colors(
-    framebuffer: Framebuffer | Mapping[str, npt.NDArray[np.float32]], names: Sequence[str] = ("R", "G", "B")
-) -> npt.NDArray[np.float32]:
-    return np.stack([framebuffer[name] for name in names], axis=-1)

@@ -48,13 +48,6 @@ def test_background(device: Device) -> None:
     )
 
 
-def test_background_of_a_region(device: Device) -> None:
-    """A region shows its part of the whole picture's background."""
-    scene = scene_of(QUICK_BALL, PERSPECTIVE, (40, 50), background=GRADIENT)
-    whole, part = shoot(scene, device), shoot(scene, device, region=(3, 31, 20, 19))
-    assert np.array_equal(stacked(part), stacked(whole)[31:50, 3:23])
-
-
 @pytest.mark.parametrize("samples", [1, 16])
 def test_transparent(device: Device, samples: int) -> None:
     """R, G, B are premultiplied: the colour times the coverage, 0 where nothing is hit."""
@@ -92,7 +85,7 @@ def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None
     assert np.array_equal(coverage[~rim], fine[~rim])
     assert rim.sum() > 100
     # Ray by ray: only those that pass the ball within two hit distances may hit or not.
-    _, passing = to_sphere(*sample_rays(scene, *sample_places(48, 48, samples, 0)), (0, 0, 0), BALL_RADIUS)
+    _, passing = to_sphere(*sample_rays(scene, *unit_squares(48, 48, samples, 0)), (0, 0, 0), BALL_RADIUS)
     fewest, most = ((passing < BALL_RADIUS + reach).mean(axis=-1) for reach in (-1e-5, 0.02 * pixel + 1e-5))
     assert (coverage >= fewest).all()
     assert (coverage <= most).all()
@@ -120,7 +113,7 @@ def test_data_channels_take_the_nearest_sample(device: Device, samples: int) -> 
     """Depth, point and normal of one ray, that of the sample nearest to the pixel's centre: hit or not, no averages."""
     scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (48, 48), renderer={"detail": 0.01, "seed": 7})
     framebuffer = shoot(scene, device, samples=samples)
-    across, below = sample_places(48, 48, samples, 7)
+    across, below = unit_squares(48, 48, samples, 7)
     chosen = ((across - 0.5) ** 2 + (below - 0.5) ** 2).argmin(axis=-1)[..., None]
     u, v = (np.take_along_axis(place, chosen, axis=-1)[..., 0] for place in (across, below))
     origin, direction, _ = rays(scene, u, v)
@@ -139,14 +132,6 @@ def test_data_channels_take_the_nearest_sample(device: Device, samples: int) -> 
     assert np.isfinite(stacked(framebuffer, [name for name in CHANNELS if name != "Z"])).all()
 
 
-def test_samples_are_stratified() -> None:
-    """The places that the device is compared with: one sample in each of N strips, in both directions."""
-    for samples in (4, 16, 64):
-        for place in sample_places(8, 8, samples, 3):
-            strips = np.sort(np.floor(place * samples), axis=-1)
-            np.testing.assert_array_equal(strips, np.broadcast_to(np.arange(samples), strips.shape))
-
-
 def test_seed_and_region_of_samples(device: Device) -> None:
     """Another seed, other places; the same seed, the same picture, in a region too."""
     scenes = [scene_of(QUICK_BALL, PERSPECTIVE, renderer={"seed": seed}) for seed in (0, 1)]
@@ -155,12 +140,6 @@ def test_seed_and_region_of_samples(device: Device) -> None:
     assert np.abs(first[..., 3] - second[..., 3]).mean() < 0.02
     part = stacked(shoot(scenes[0], device, samples=4, region=(17, 5, 40, 33)))
     assert np.array_equal(part, first[5:38, 17:57])
-
-
-def sample_places(width: int, height: int, samples: int, seed: int) -> tuple[Floats, Floats]:
-    """Places of the samples in their pixels, from the left and from the top, shape (height, width, samples): a box filter
-    of one pixel leaves the points of the unit square as they are."""
-    return unit_squares(width, height, samples, seed)
 
 
 def sample_rays(scene: Scene, across: Floats, below: Floats) -> tuple[Floats, Floats]:

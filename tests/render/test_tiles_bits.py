@@ -24,8 +24,6 @@ from clfractal.scene.model import Scene
 from tests.render.bits import close, same
 from tests.render.shots import (
     CHANNELS,
-    ORTHOGRAPHIC,
-    PERSPECTIVE,
     plan_of,
     render_planned,
     render_tile,
@@ -245,15 +243,6 @@ def test_interrupted_and_resumed(
     again.discard()
 
 
-def test_fewer_channels_are_the_same(device: Device, wholes: dict[str, npt.NDArray[np.float32]]) -> None:
-    """A channel does not depend on which others are wanted, nor on their order."""
-    names = ("Z", "R", "N.Y")
-    framebuffer = shoot(SCENES["mandelbulb"], device, channels=names)
-    for name in names:
-        expected = wholes["mandelbulb"][..., CHANNELS.index(name)]
-        assert same(framebuffer[name], np.ascontiguousarray(expected)), name
-
-
 @pytest.mark.combination
 @pytest.mark.parametrize("name", ["mandelbulb"])
 def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
@@ -270,17 +259,3 @@ def test_float64_shows_the_same(device: Device, name: str) -> None:
     if has_float64(device.info):
         scene = scene_of({"name": name, "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
         close(stacked(shoot(scene, device, "float64")), stacked(shoot(scene, device)))
-
-
-@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC])
-def test_size_of_the_picture_moves_nothing(device: Device, camera: dict[str, Any]) -> None:
-    """With three times the pixels every third one has the same ray, in the middle of the coarse one."""
-    formula = {"name": "hast", "iterations": 8}
-    coarse, fine = (
-        shoot(scene_of(formula, camera, (20 * n, 15 * n), renderer={"detail": 0.01}), device) for n in (1, 3)
-    )
-    a, b = stacked(coarse), stacked(fine)[1::3, 1::3]
-    hit = (a[..., CHANNELS.index("A")] > 0) & (b[..., CHANNELS.index("A")] > 0)
-    assert hit.sum() > 40
-    difference = np.abs(a[hit] - b[hit])[:, CHANNELS.index("Z")]
-    assert np.median(difference) < 5e-3

@@ -200,28 +200,6 @@ def test_what_this_program_writes_stays_where_it_was(
         check_ball(shoot(shown, device), shown, STEPS[name])
 
 
-def test_the_bar_that_is_turned_by_thirty_degrees(device: Device, tmp_path: Path) -> None:
-    """A bar along the first axis of the array, from voxel 2 to 28: it lies along (cos 30, sin 30) in the picture."""
-    values = np.zeros((20, 24, 30), np.float32)
-    values[8:12, 10:14, 2:28] = 100
-    steps = 0.1 * np.array([[_C, _S, 0], [-_S, _C, 0], [0, 0, 1]])
-    write_volume(tmp_path / "bar.nrrd", Volume(values, np.array([-1, -1.5, -1]), steps))
-    camera = {"projection": "orthographic", "position": [0, 0, 9], "up": [0, 1, 0], "height": 5}
-    transfer = {"opacity": [{"at": 20, "opacity": 0}, {"at": 60, "opacity": 1}]}
-    scene = volume_scene(
-        camera, folder=tmp_path, file="bar.nrrd", transfer=transfer, look=FLAT, size=(96, 96)
-    )
-    framebuffer = shoot(scene, device)
-    seen = points_of(framebuffer)[framebuffer["A"] > 0.5]
-    index = np.linalg.solve(steps.T, (seen - [-1, -1.5, -1]).T)
-    # From half a voxel before the first to half a voxel past the last, to a pixel and the values between.
-    np.testing.assert_allclose(index.min(1)[:2], [1.5, 9.5], atol=0.7)
-    np.testing.assert_allclose(index.max(1)[:2], [27.5, 13.5], atol=0.7)
-    middle = np.array([-1, -1.5]) + np.array([14.5, 11.5]) @ steps[:2, :2]
-    np.testing.assert_allclose(seen.mean(0)[:2], middle, atol=0.03)
-    assert np.polyfit(seen[:, 0], seen[:, 1], 1)[0] == pytest.approx(np.tan(np.pi / 6), abs=0.03)
-
-
 def test_a_pixel_is_probed_where_it_is(folder: Path) -> None:
     scene = volume_scene(ORTHOGRAPHIC, folder=folder, file=file_of("turned"), level=0.0)
     found = clfractal.probe(scene, 28, 20)

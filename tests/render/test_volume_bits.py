@@ -7,11 +7,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.model import Scene
 from clfractal.voxels import pool
 from tests import scenes
@@ -151,47 +149,6 @@ def test_samples(device: Device, tmp_path: Path) -> None:
     framebuffer = shoot(scene, device)
     assert set(framebuffer["samples"][4:11, 4:11].flat) == {8}
     assert framebuffer["samples"][2, 4:11].min() > 30
-
-
-@pytest.mark.parametrize(
-    "turn",
-    [
-        [[1, 0, 0], [0, 1, 0], [0, 0, 1]],
-        [[-1, 0, 0], [0, 1, 0], [0, 0, -1]],
-        [[0, 0, 1], [1, 0, 0], [0, 1, 0]],
-        [[0, -1, 0], [0, 0, 1], [-1, 0, 0]],
-    ],
-)
-def test_files_whose_axes_run_otherwise(device: Device, tmp_path: Path, turn: list[list[float]]) -> None:
-    """The same object stored along other axes, forward and backward, is the same picture."""
-    shape, spacing = np.array([30, 24, 20]), np.array([0.06, 0.08, 0.1])
-    corner = -shape * spacing / 2
-
-    def object_at(places: npt.NDArray[np.float64]) -> npt.NDArray[np.float32]:
-        ball = 0.5 - np.linalg.norm(places - [0.2, -0.1, 0.25], axis=-1)
-        nose = 0.2 - np.linalg.norm(places - [-0.6, 0.3, -0.4], axis=-1)
-        values: npt.NDArray[np.float64] = np.clip(0.5 + np.maximum(ball, nose) / 0.08, 0, 1)
-        return values.astype(np.float32)
-
-    straight = object_at(middles(shape.tolist(), corner, spacing))
-    keep(tmp_path / "straight.nrrd", straight, corner, spacing)
-    # Axis i of the file runs along turn[i].
-    axes = np.array(turn, float)
-    of = [int(np.abs(row).argmax()) for row in axes]
-    sides, steps = shape[of], axes * spacing[of][:, None]
-    first = corner + spacing / 2 + np.sum(np.where(axes < 0, (shape - 1) * spacing, 0), axis=0)
-    k, j, i = np.meshgrid(*(np.arange(n) for n in sides[::-1]), indexing="ij")
-    places = first + i[..., None] * steps[0] + j[..., None] * steps[1] + k[..., None] * steps[2]
-    write_volume(tmp_path / "turned.nrrd", Volume(object_at(places), first, steps))
-    framebuffers = [
-        shoot(volume_scene(PERSPECTIVE, folder=tmp_path, file=f"{name}.nrrd", look=LIT), device)
-        for name in ("straight", "turned")
-    ]
-    np.testing.assert_allclose(stacked(framebuffers[1], "RGBA"), stacked(framebuffers[0], "RGBA"), atol=2e-3)
-    assert framebuffers[0]["A"].mean() > 0.05
-    # The small ball is where it is: left of the middle, and low.
-    low = points_of(framebuffers[1])[framebuffers[1]["P.Z"] < -0.3]
-    assert (np.linalg.norm(low - [-0.6, 0.3, -0.4], axis=-1) < 0.25).all()
 
 
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])

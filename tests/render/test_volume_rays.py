@@ -102,33 +102,6 @@ def look_of(transfer: dict[str, Any]) -> Any:
     return look
 
 
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_opacity_of_a_ball_of_one_density(device: Device, folder: Path, camera: str) -> None:
-    """Beer's law, 1 - 0.9^(chord in voxels): as if the radius were off by less than a fifth of a voxel, or, where rays
-    graze the soft rim, by two voxels."""
-    scene = volume_scene(
-        CAMERAS[camera], folder=folder, file="ball.nrrd", transfer=FOG, step=0.1, opacity_limit=1
-    )
-    framebuffer = shoot(scene, device)
-    nearest = to_sphere(*rays(scene)[:2], CENTER, RADIUS)[1]
-
-    def opacity(radius: float) -> Floats:
-        chord: Floats = 2 * np.sqrt(np.maximum(radius**2 - nearest**2, 0)) / VOXEL
-        return 1 - 0.9**chord
-
-    clear = nearest < 0.9 * RADIUS
-    assert clear.sum() > 250
-    for where, off in ((clear, 0.2 * VOXEL), (nearest >= 0, 2 * VOXEL)):
-        assert (framebuffer["A"] >= opacity(RADIUS - off) - ROUNDING)[where].all()
-        assert (framebuffer["A"] <= opacity(RADIUS + off) + ROUNDING)[where].all()
-    outside = nearest > RADIUS + VOXEL * (0.5 + np.sqrt(3))
-    assert not framebuffer["A"][outside].any()
-    # Over nothing, colours are premultiplied.
-    np.testing.assert_allclose(
-        stacked(framebuffer, "RGB"), framebuffer["A"][..., None] * COLOR, atol=ROUNDING
-    )
-
-
 @pytest.mark.parametrize("step", [0.05, 0.5, 1, 2])
 def test_opacity_does_not_depend_on_the_step(device: Device, folder: Path, step: float) -> None:
     """A slab of one density, seen from the front: any step stops the same part of the light, to within a step."""
