@@ -154,8 +154,7 @@ def check_opened(known: Known, device: Device) -> None:
     framebuffer = shoot(scene, device)
 
     def left(points: Floats) -> Floats:
-        found: Floats = np.maximum(known.distance(points), (points - known.position) @ normal)
-        return found
+        return np.asarray(np.maximum(known.distance(points), (points - known.position) @ normal))
 
     origin, direction, _ = rays(scene)
     t = marched(left, origin, direction)

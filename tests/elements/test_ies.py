@@ -89,8 +89,7 @@ def candela(
     low, high = np.array(horizontal)[after - 1], np.array(horizontal)[after]
     share = (at - low) / (high - low)
     lower = np.take_along_axis(rows, (after - 1)[None], 0)[0]
-    found: Floats = lower + share * (np.take_along_axis(rows, after[None], 0)[0] - lower)
-    return found
+    return np.asarray(lower + share * (np.take_along_axis(rows, after[None], 0)[0] - lower))
 
 
 def lit(folder: Path, text: str, mode: str = "direct", **light: Any) -> Scene:

@@ -74,8 +74,7 @@ def axes_of(scene: Scene) -> Floats:
     """The object's own half axes, as rows."""
     (it,) = scene.objects.values()
     assert isinstance(it, Solid)
-    found: Floats = np.array(it.axes)
-    return found
+    return np.asarray(np.array(it.axes))
 
 
 def choices(lit: Scene, point: Floats, precision: Precision, lanes: int, count: int = 1 << 13) -> Floats:
@@ -97,8 +96,7 @@ def choices(lit: Scene, point: Floats, precision: Precision, lanes: int, count: 
 def moments(directions: Floats, about: Floats) -> Floats:
     """1, and how far directions are from one, and their squares: what even light has to bring right."""
     offset = directions - about
-    found: Floats = np.concatenate([np.ones((len(offset), 1)), offset, offset**2], axis=1)
-    return found
+    return np.asarray(np.concatenate([np.ones((len(offset), 1)), offset, offset**2], axis=1))
 
 
 def expected(lit: Scene, point: Floats, hits: Hits, rays: int = 1 << 19) -> tuple[Floats, Floats]:

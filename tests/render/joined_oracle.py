@@ -28,16 +28,14 @@ TURN, MOVED, SCALE = [20, -35, 50], [0.2, 0.1, -0.1], 0.7
 
 
 def ball(points: Floats) -> Floats:
-    found: Floats = np.linalg.norm(points, axis=-1) - BALL_RADIUS
-    return found
+    return np.asarray(np.linalg.norm(points, axis=-1) - BALL_RADIUS)
 
 
 def solids(points: Floats) -> Floats:
     """`SOLIDS`, which is 0 inside where it is a formula's."""
     q = np.abs(points - [0, 0, -0.25]) - [1.2, 1.2, 0.25]
     box = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    found: Floats = np.minimum(np.linalg.norm(points - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS, box)
-    return found
+    return np.asarray(np.minimum(np.linalg.norm(points - SPHERE_CENTER, axis=-1) - SPHERE_RADIUS, box))
 
 
 def placed(distance: Distance, scale: float = SCALE, place: list[float] | None = None) -> Distance:
@@ -52,26 +50,24 @@ def a_sphere(center: list[float], radius: float) -> Distance:
 def a_box(points: Floats) -> Floats:
     """Of sides 1.2, 0.5, 0.9 in its own space."""
     q = np.abs(points) - [0.6, 0.25, 0.45]
-    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    return found
+    return np.asarray(np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0))
 
 
 def a_cylinder(points: Floats) -> Floats:
     """Of radius 0.4 and height 1.3 in its own space."""
     q = np.stack([np.linalg.norm(points[..., :2], axis=-1) - 0.4, np.abs(points[..., 2]) - 0.65], -1)
-    found: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    return found
+    return np.asarray(np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0))
 
 
 def a_plane(points: Floats) -> Floats:
-    found: Floats = (points - [0, 0, 0.2]) @ (np.array([0.3, -0.2, 2.0]) / np.linalg.norm([0.3, -0.2, 2.0]))
-    return found
+    return np.asarray(
+        (points - [0, 0, 0.2]) @ (np.array([0.3, -0.2, 2.0]) / np.linalg.norm([0.3, -0.2, 2.0]))
+    )
 
 
 def smooth(a: Floats, b: Floats, width: float) -> Floats:
     share = np.maximum(width - np.abs(a - b), 0) / width
-    found: Floats = np.minimum(a, b) - 0.25 * width * share**2
-    return found
+    return np.asarray(np.minimum(a, b) - 0.25 * width * share**2)
 
 
 def marched(distance: Distance, origin: Floats, direction: Floats, far: float = 8.0) -> Floats:
@@ -86,8 +82,7 @@ def marched(distance: Distance, origin: Floats, direction: Floats, far: float = 
 def normal_at(distance: Distance, points: Floats) -> Floats:
     step = 1e-5 * np.eye(3)
     slope = np.stack([distance(points + e) - distance(points - e) for e in step], -1)
-    found: Floats = slope / np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-30)
-    return found
+    return np.asarray(slope / np.maximum(np.linalg.norm(slope, axis=-1, keepdims=True), 1e-30))
 
 
 PLACED = {"rotation": TURN, "position": MOVED}
@@ -111,8 +106,7 @@ def beside_a_rim(met: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
     edged = np.pad(met, 2, mode="edge")
     rows, columns = met.shape
     around = [edged[i : i + rows, j : j + columns] for i in range(5) for j in range(5)]
-    found: npt.NDArray[np.bool_] = np.any(around, axis=0) != np.all(around, axis=0)
-    return found
+    return np.asarray(np.any(around, axis=0) != np.all(around, axis=0))
 
 
 def agree(
@@ -142,5 +136,4 @@ def agree(
     assert (off > 0.8).mean() < 0.04, np.percentile(off, [50, 80, 90, 95, 99])
     angle = np.degrees(np.arccos(np.clip((normals_of(framebuffer) * normals).sum(-1), -1, 1)))[front]
     assert np.percentile(angle, 80) < degrees
-    seen: npt.NDArray[np.bool_] = front
-    return seen
+    return np.asarray(front)

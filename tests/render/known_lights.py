@@ -28,8 +28,7 @@ def of_ball(points: Floats) -> Floats:
     """L (r/d)^2 cos: irradiance over pi where the ball is wholly above the horizon."""
     way = PLACE - points
     square = (way**2).sum(-1)
-    found: Floats = 3 * 0.7**2 / square * way[..., 2] / np.sqrt(square)
-    return found
+    return np.asarray(3 * 0.7**2 / square * way[..., 2] / np.sqrt(square))
 
 
 def of_window(points: Floats) -> Floats:
@@ -53,8 +52,7 @@ def of_spot(points: Floats) -> Floats:
     distance = np.linalg.norm(way, axis=-1)
     cosine = way[..., 2] / distance
     t = np.clip((25 - np.degrees(np.arccos(cosine))) / 12.5, 0, 1)
-    found: Floats = 5 * cosine / distance**2 * t * t * (3 - 2 * t)
-    return found
+    return np.asarray(5 * cosine / distance**2 * t * t * (3 - 2 * t))
 
 
 CASES = [(BALL, of_ball), (WINDOW, of_window), (SPOT, of_spot)]

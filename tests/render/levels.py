@@ -47,8 +47,7 @@ def slopes(chain: Chain, points: Floats, applications: int) -> Floats:
     """How |z| after so many applications changes along x, y and z, shape (n, 3)."""
 
     def size(at: Floats) -> Floats:
-        last: Floats = sizes(chain, at, applications)[-1]
-        return last
+        return np.asarray(sizes(chain, at, applications)[-1])
 
     with np.errstate(all="ignore"):
         ways = [(size(points + STEP * e) - size(points - STEP * e)) / (2 * STEP) for e in np.eye(3)]
@@ -67,8 +66,7 @@ def onto_level(chain: Chain, points: Floats, applications: int, level: float) ->
 def inside(chain: Chain, points: Floats, applications: int) -> npt.NDArray[np.bool_]:
     """Which points belong to the solid of so many applications."""
     size = sizes(chain, points, applications)
-    within: npt.NDArray[np.bool_] = (size <= chain.distance_bailout).all(axis=0) & (size[-1] <= chain.bailout)
-    return within
+    return np.asarray((size <= chain.distance_bailout).all(axis=0) & (size[-1] <= chain.bailout))
 
 
 def along(
@@ -94,5 +92,4 @@ def degrees(normals: Floats, expected: Floats) -> Floats:
     """Angles between normals and directions of any length."""
     with np.errstate(all="ignore"):
         unit = expected / np.linalg.norm(expected, axis=-1, keepdims=True)
-    found: Floats = np.degrees(np.arccos(np.clip((normals * unit).sum(-1), -1, 1)))
-    return found
+    return np.asarray(np.degrees(np.arccos(np.clip((normals * unit).sum(-1), -1, 1))))

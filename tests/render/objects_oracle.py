@@ -34,8 +34,7 @@ def rotation_of(degrees: tuple[float, float, float]) -> Floats:
     about_x = np.array([[1, 0, 0], [0, cx, -sx], [0, sx, cx]])
     about_y = np.array([[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]])
     about_z = np.array([[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]])
-    found: Floats = about_z @ about_y @ about_x
-    return found
+    return np.asarray(about_z @ about_y @ about_x)
 
 
 def met(scene: Scene, origin: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:

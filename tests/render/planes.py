@@ -46,8 +46,7 @@ def pixel_points(scene: Scene) -> Floats:
     across = (np.arange(width) + 0.5 - width / 2) * step
     above = (height / 2 - 0.5 - np.arange(height)) * step
     sideways = across[None, :, None] * np.array(placed.side)
-    points: Floats = np.array(placed.center) + sideways + above[:, None, None] * np.array(placed.up)
-    return points
+    return np.asarray(np.array(placed.center) + sideways + above[:, None, None] * np.array(placed.up))
 
 
 def mandelbrot(

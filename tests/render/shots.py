@@ -118,8 +118,7 @@ def render_tile(scene: Scene, plan: Plan, device: Device, tile: Tile) -> npt.NDA
     (whole,) = [result for result in results if len(result.tiles)]
     assert whole.tiles.tolist() == [tile.index]
     top, left = tile.y % TILE, tile.x % TILE
-    part: npt.NDArray[np.float32] = whole.framebuffer[0][:, top : top + tile.height, left : left + tile.width]
-    return part
+    return np.asarray(whole.framebuffer[0][:, top : top + tile.height, left : left + tile.width])
 
 
 def shoot(

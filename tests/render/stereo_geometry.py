@@ -26,8 +26,7 @@ def dot(a: Floats, b: Floats) -> float:
 
 
 def unit(vector: Any) -> Floats:
-    found: Floats = np.array(vector, float) / np.linalg.norm(vector)
-    return found
+    return np.asarray(np.array(vector, float) / np.linalg.norm(vector))
 
 
 # Neither of length 1 nor perpendicular.

@@ -6,7 +6,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device, has_float64
@@ -17,11 +16,9 @@ from tests.devices import device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.planes import plane_scene
 from tests.render.point_checks import agree, orbit_bytes
-from tests.render.shots import shoot
+from tests.render.shots import Floats, shoot
 from tests.small_kernels import SmallKernels
 from tests.voxels.grids import filled, volume_scene
-
-Floats = npt.NDArray[np.float64]
 
 BULB = {"name": "mandelbulb", "parameters": {"power": 2.5}}
 CHAINS: dict[str, list[dict[str, Any]]] = {

@@ -143,8 +143,7 @@ def units(count: int, seed: int = 1) -> Floats:
 
 
 def normalized(vectors: Floats) -> Floats:
-    result: Floats = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
-    return result
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
 
 
 def views_onto(normals: Floats) -> Floats:

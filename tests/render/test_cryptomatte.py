@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -23,10 +22,8 @@ from clfractal.integrators.state import state_numbers
 from clfractal.integrators.surface import program_texts
 from clfractal.shading.cryptomatte import bits_of, identifier, murmur3, ranked
 from tests.render.path_scenes import path, scene_of
-from tests.render.shots import plan_of
+from tests.render.shots import Floats, plan_of
 from tests.variants import one_of
-
-Floats = npt.NDArray[np.float64]
 
 PIXELS, HEIGHT = 48, 3.2
 # A ball of radius 1 is the set; one of 0.5 stands before its rim, and one of 0.4 behind, so that half of it is hidden.

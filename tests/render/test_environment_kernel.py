@@ -21,8 +21,7 @@ from clfractal.scene.lighting import Environment
 from clfractal.shading.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from tests.devices import check_usable
 from tests.render.environment_kernel import ask, every_variant, settings_of
-
-Floats = npt.NDArray[np.floating[Any]]
+from tests.small_kernels import Floats
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 

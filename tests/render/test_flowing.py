@@ -39,8 +39,7 @@ def share_of_drop(points: Floats) -> Floats:
     """The derivative of the smooth minimum by the drop's distance."""
     a, b = np.maximum(solids(points), 0), a_sphere(PLACE, RADIUS)(points)
     others = 0.5 * np.maximum(WIDTH - np.abs(a - b), 0) / WIDTH
-    found: Floats = np.where(b < a, 1 - others, others)
-    return found
+    return np.asarray(np.where(b < a, 1 - others, others))
 
 
 def check(framebuffer: Any, scene: Scene, shown: Floats) -> None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -16,8 +15,6 @@ from tests.render.path_scenes import path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
-
-Floats = npt.NDArray[np.float64]
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))

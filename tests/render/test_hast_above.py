@@ -91,8 +91,7 @@ def point_inside(
         if len(found):
             confirmed = reference.escape(chain, found, ITERATIONS)[1]
             if confirmed.any():
-                first: npt.NDArray[np.float64] = found[confirmed][0]
-                return first
+                return np.asarray(found[confirmed][0])
         best = np.argsort(-counts, kind="stable")[:256]
         chosen = best[random.integers(len(best), size=count)]
         own = own[chosen]

@@ -58,8 +58,7 @@ def hollowed(points: Floats) -> Floats:
         a_sphere(place, scale * BALL_RADIUS)(points) for place, scale in ((HOLE, SIZE), (OTHER_HOLE, 0.4))
     ]
     left = np.maximum(a_sphere([0, 0, 0], BALL_RADIUS)(points), -np.minimum(*holes))
-    found: Floats = np.minimum(left, a_sphere(PEARL, 0.15 * BALL_RADIUS)(points))
-    return found
+    return np.asarray(np.minimum(left, a_sphere(PEARL, 0.15 * BALL_RADIUS)(points)))
 
 
 WAYS: dict[str, dict[str, Any]] = {"distance": {"step": 0.02}, "steps": {"search": "steps", "step": 0.01}}
@@ -138,8 +137,7 @@ def mould(**sections: Any) -> Scene:
 
 def ways(scene: Scene, t: Floats, direction: Floats, origin: Floats, width: Floats) -> npt.NDArray[np.bool_]:
     """Which places of rays belong to the set, at distances of shape (rays, places)."""
-    found: npt.NDArray[np.bool_] = belongs(scene, origin[:, None] + t[..., None] * direction[:, None])
-    return found
+    return np.asarray(belongs(scene, origin[:, None] + t[..., None] * direction[:, None]))
 
 
 def test_a_mould_of_a_fractal(device: Device) -> None:

@@ -7,7 +7,6 @@ import re
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -18,10 +17,8 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.passes import kept_numbers
 from clfractal.scene.model import Scene
 from tests.render.path_scenes import BLACK, path, scene_of
-from tests.render.shots import plan_of, shoot
+from tests.render.shots import Floats, plan_of, shoot
 from tests.variants import one_of
-
-Floats = npt.NDArray[np.float64]
 
 SHINES = (0.5, 0.25, 0.0)
 CLAY: dict[str, Any] = {"base": {"color": [0.6, 0.3, 0.1]}, "specular": {"weight": 0}}

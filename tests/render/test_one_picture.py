@@ -47,8 +47,7 @@ def blocks(framebuffer: Framebuffer) -> npt.NDArray[np.float64]:
     """Mean light over BLOCKS x BLOCKS parts of a picture whose sides are multiples of BLOCKS."""
     light = np.asarray(framebuffer, np.float64)[..., :3]
     rows, columns = light.shape[0] // BLOCKS, light.shape[1] // BLOCKS
-    parts: npt.NDArray[np.float64] = light.reshape(BLOCKS, rows, BLOCKS, columns, 3).mean(axis=(1, 3))
-    return parts
+    return np.asarray(light.reshape(BLOCKS, rows, BLOCKS, columns, 3).mean(axis=(1, 3)))
 
 
 def apart(one: Framebuffer, other: Framebuffer) -> float:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from tests.render.sampler import samplers
+from tests.small_kernels import Floats
 
-Floats = npt.NDArray[np.floating[Any]]
 COUNT = 1 << 14
 NEARLY_EVEN = 0.0005  # taken as 0
 

@@ -35,8 +35,7 @@ def only(kernel: str) -> str:
 
 
 def table(case: str) -> Floats:
-    rows: Floats = np.loadtxt(TABLES / f"{case}.csv", delimiter=",", skiprows=1)
-    return rows
+    return np.asarray(np.loadtxt(TABLES / f"{case}.csv", delimiter=",", skiprows=1))
 
 
 # --- escape counts ---

@@ -131,8 +131,7 @@ class Found:
         origin, way = self.origin[chosen], self.direction[chosen]
         if t.ndim == 2:
             origin, way = origin[:, None], way[:, None]
-        result: Floats = origin + distance * way
-        return result
+        return np.asarray(origin + distance * way)
 
 
 def found_by(device: Device, scene: Scene, precision: Precision = "float32") -> Found:

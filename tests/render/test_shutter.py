@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -24,11 +23,9 @@ from clfractal.integrators import shutter as shutters
 from clfractal.integrators.shutter import Shutter, shutter_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
-from tests.render.shots import BALL, BALL_RADIUS
+from tests.render.shots import BALL, BALL_RADIUS, Floats
 from tests.scenes import BALL_ITERATIONS
 from tests.variants import combinations, one_of
-
-Floats = npt.NDArray[np.float64]
 
 ABOVE = {"projection": "orthographic", "position": [0, -3, 0], "target": [0, 0, 0], "height": 3}
 

@@ -86,8 +86,7 @@ def points_before(view: View, seed: int, count: int = 50) -> Floats:
     assert view.eye is not None
     across, rise = chance.uniform(-0.7, 0.7, (2, count))
     on_plane = view.center + np.outer(across * view.width, view.side) + np.outer(rise * view.height, view.up)
-    found: Floats = view.eye + (on_plane - view.eye) * 10.0 ** chance.uniform(-1, 1, (count, 1))
-    return found
+    return np.asarray(view.eye + (on_plane - view.eye) * 10.0 ** chance.uniform(-1, 1, (count, 1)))
 
 
 def ten_steps(setting: Setting, side: str, front: float, back: float) -> dict[str, Any]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -20,7 +19,6 @@ from tests.render.path_scenes import BLACK, GREY, path, scene_of, seen
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 
 MATT = {"weight": 0}
 

@@ -6,7 +6,6 @@ from functools import cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -18,10 +17,10 @@ from clfractal.scene.sun import SOLID_ANGLE, Sun, sun_of
 from clfractal.shading.environment import pack_environment
 from tests.devices import check_usable
 from tests.render.environment_kernel import ask, every_variant, settings_of
+from tests.render.shots import Floats
 
 pytestmark = pytest.mark.light
 
-Floats = npt.NDArray[np.float64]
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 LOW = Sky(sun_elevation=2.0, sun_azimuth=30.0)
@@ -45,8 +44,7 @@ def near(sun: Sun, count: int, seed: int, reach: float = 3.0) -> Floats:
 def turned(directions: Floats, degrees: float) -> Floats:
     """Counterclockwise about z, seen from above."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
-    found: Floats = directions @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
-    return found
+    return np.asarray(directions @ np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
 
 
 @every_variant

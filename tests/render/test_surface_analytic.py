@@ -174,12 +174,10 @@ def test_bounds_of_the_scene_cut(device: Device) -> None:
 
 def _unit(vectors: Floats) -> Floats:
     """Vectors (..., 3) at length 1; those without any stay."""
-    result: Floats = vectors / np.linalg.norm(vectors, axis=-1, keepdims=True).clip(1e-9)
-    return result
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True).clip(1e-9))
 
 
 def _box_distance(points: Floats) -> Floats:
     """Of the box |x|, |y| <= 1.2, -0.5 <= z <= 0."""
     q = np.abs(points - [0, 0, -0.25]) - [1.2, 1.2, 0.25]
-    result: Floats = np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0)
-    return result
+    return np.asarray(np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0))

@@ -58,8 +58,7 @@ def disk(count: int) -> Floats:
     """Points spread evenly over the unit disk, by the golden angle (Vogel 1979)."""
     number = np.arange(count) + 0.5
     angle = number * np.pi * (3 - np.sqrt(5))
-    places: Floats = np.sqrt(number / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1)
-    return places
+    return np.asarray(np.sqrt(number / count)[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
 @pytest.mark.parametrize("size", [2.0, 15.0, 60.0])

@@ -52,21 +52,18 @@ STEPS: dict[str, Floats] = {
 
 def origin_of(steps: Floats) -> Floats:
     """Where the first voxel's middle is, of a grid around the origin."""
-    found: Floats = -(np.array(SHAPE) - 1) / 2 @ steps
-    return found
+    return np.asarray(-(np.array(SHAPE) - 1) / 2 @ steps)
 
 
 def places(steps: Floats) -> Floats:
     """The middles of all voxels, shape (nz, ny, nx, 3)."""
     z, y, x = np.indices(SHAPE[::-1])
-    found: Floats = origin_of(steps) + np.stack([x, y, z], axis=-1) @ steps
-    return found
+    return np.asarray(origin_of(steps) + np.stack([x, y, z], axis=-1) @ steps)
 
 
 def depth(points: Floats) -> Floats:
     """How deep in the ball places are."""
-    found: Floats = RADIUS - np.linalg.norm(points - CENTER, axis=-1)
-    return found
+    return np.asarray(RADIUS - np.linalg.norm(points - CENTER, axis=-1))
 
 
 def file_of(name: str) -> str:
@@ -229,8 +226,7 @@ def corners(scene: Scene) -> npt.NDArray[np.float64]:
     up = np.cross(side, forward)
     basis = [each / np.linalg.norm(each) for each in (side, up)]
     half = camera.height / 2  # type: ignore[union-attr]
-    found: npt.NDArray[np.float64] = (scene.given.place.ends - camera.target) @ np.array(basis).T / half
-    return found
+    return np.asarray((scene.given.place.ends - camera.target) @ np.array(basis).T / half)
 
 
 @pytest.mark.parametrize("name", STEPS)

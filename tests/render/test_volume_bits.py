@@ -21,10 +21,6 @@ SIZE = (70, 40)
 FOG = {"opacity": [{"at": 0.1, "opacity": 0}, {"at": 1, "opacity": 0.4}]}
 WHITE = [{"at": 0, "color": [1, 1, 1]}, {"at": 1, "color": [1, 1, 1]}]
 LIGHTS = [{"direction": [-1, 1, -1], "shadow": True}, {"type": "point", "position": [2, -2, 3]}]
-PLANES = [
-    {"plane": {"center": [0, -0.2, 0], "normal": [0.2, -1, 0.3]}, "opacity": 0.5},
-    {"plane": {"center": [0.2, 0, 0], "normal": [1, -0.3, 0.2]}, "cut": True, "opacity": 0.3},
-]
 HAST = {"name": "hast", "iterations": 12}
 CAMERA = {"position": [1.5, -2.5, 1.5], "target": [0, 0, 0], "fov": 45}
 
@@ -35,8 +31,6 @@ def scene_of(**sections: Any) -> Scene:
 
 
 BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}
-VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "shadows": True}
-UNSEEN = {"plane": {"center": [0, 0, 9]}, "opacity": 0}
 
 
 def shaded(look: dict[str, Any]) -> dict[str, Any]:
