@@ -32,11 +32,11 @@ def scene_of(**sections: Any) -> Scene:
     return clfractal.Scene(**sections_of(**{**usual, **sections}))
 
 
-def seen(scene: Scene, samples: int) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
+def seen(scene: Scene, samples: int, **options: Any) -> tuple[Floats, Floats, npt.NDArray[np.bool_]]:
     """Colours, shape (n, 3), and normals of the pixels that see the set wholly; and which pixels these are."""
     renderer = scene.surface.model_copy(update={"samples": samples})
     channels = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z")
-    film = clfractal.render(scene.model_copy(update={"renderer": renderer}), channels=channels)
+    film = clfractal.render(scene.model_copy(update={"renderer": renderer}), channels=channels, **options)
     whole = np.asarray(film["A"]) == 1
     colors = np.stack([film[name] for name in "RGB"], axis=-1).astype(np.float64)
     normals = np.stack([film[f"N.{axis}"] for axis in "XYZ"], axis=-1).astype(np.float64)

@@ -136,9 +136,8 @@ def test_files_follow_the_specification(tmp_path: Path) -> None:
         ("CryptoMaterial", ["red", "blue", "material"]),
     ):
         key = f"cryptomatte/{murmur3(layer.encode()):08x}"[:19]
-        assert header[f"{key}/name"] == layer
-        assert header[f"{key}/hash"] == "MurmurHash3_32"
-        assert header[f"{key}/conversion"] == "uint32_to_float32"
+        told = {"name": layer, "hash": "MurmurHash3_32", "conversion": "uint32_to_float32"}
+        assert {name: header[f"{key}/{name}"] for name in told} == told
         manifest = json.loads(header[f"{key}/manifest"])
         assert list(manifest) == names
         for name, told in manifest.items():

@@ -119,22 +119,6 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
     )
 
 
-def test_lit_straight_on_faces_look_as_in_phongs_light(device: Device) -> None:
-    """Where a light of intensity 1 shines along the first plane's normal, its face has its colours in both modes."""
-    light = {"direction": list(-FRONT), "shadow": True}
-    framebuffers = [framebuffer_of(scene_of(lights=[light], **each), device) for each in MODES.values()]
-    scene = scene_of()
-    found, at, _ = met_by_eye(scene)
-    tint, certain = face_tint(scene, found, at)
-    face = found.sure & certain & (found.plane == 0)
-    lit = face & (stacked(framebuffers[1], "RGB").max(-1) > 0)
-    assert lit.sum() > 0.8 * face.sum(), "the egg throws a shadow"
-    np.testing.assert_allclose(stacked(framebuffers[0], "RGB")[lit], tint[lit], atol=2e-4)
-    np.testing.assert_allclose(stacked(framebuffers[1], "RGB")[lit], tint[lit], atol=2e-4)
-    for name in ("Z", "N.X", "N.Y", "N.Z", "iterations", "A", "object"):
-        np.testing.assert_array_equal(framebuffers[0][name][face], framebuffers[1][name][face])
-
-
 def test_shadows_end_where_cuts_begin(device: Device) -> None:
     """The mirror is out of the light of what is left of the bodies, and in that of what planes removed: here, matt and seen
     from the side of a lamp, each of its pixels is lit or not as its own ray to the light says."""

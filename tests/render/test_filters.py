@@ -72,31 +72,6 @@ def test_profile_of_an_edge(device: Device, name: str, width: float, height: flo
         assert coverage.sum() * pixel**2 == pytest.approx(4 * (HALF + DETAIL / 2 * pixel) ** 2, rel=1e-3)
 
 
-@pytest.mark.parametrize(("name", "width"), FILTERS[::2])
-def test_whole_picture_is_filtered(device: Device, name: str, width: float) -> None:
-    """A turned square, its corners too: the mean over the filter's area in both directions. Independent samples would have
-    a standard error of sqrt(p (1 - p) / N)."""
-    samples, fine, height = 256, 96, 4.0
-    scene = from_above(name, width, height, [0.4, 1, 0], samples)
-    coverage = shoot(scene, device, channels=("A",))["A"].astype(float)
-    grid = np.linspace(-0.5, 0.5, 20001)
-    place = width * np.interp((np.arange(fine) + 0.5) / fine, passed(name, grid), grid)
-    places = ((np.arange(SIDE) + 0.5 - SIDE / 2)[:, None] + place) * height / SIDE
-    cosine, sine = np.array([1, 0.4]) / np.hypot(1, 0.4)
-    expected = np.zeros((SIDE, SIDE))
-    for column, across in enumerate(places):
-        x, y = across[:, None, None], -places
-        inside = (np.abs(x * cosine + y * sine) < HALF) & (np.abs(y * cosine - x * sine) < HALF)
-        expected[:, column] = inside.mean((0, 2))
-    error = coverage - expected
-    part = (expected > 0.01) & (expected < 0.99)
-    assert part.sum() > 140
-    independent = np.sqrt((expected * (1 - expected))[part].mean() / samples)
-    assert np.sqrt((error[part] ** 2).mean()) < 0.5 * independent
-    assert np.abs(error).max() < 0.04
-    assert abs(error.sum()) < 2 * DETAIL * 4 * 2 * HALF / height * SIDE
-
-
 @pytest.mark.parametrize(("name", "width"), [("box", 1.0), ("tent", 2.0), ("blackman_harris", 3.0)])
 def test_usual_widths(device: Device, name: str, width: float) -> None:
     usual, given = (

@@ -110,20 +110,22 @@ def test_files_of_both_formats(tmp_path: Path, region: Region | None) -> None:
     for name in ALL:
         assert planes[name].dtype == (np.float16 if CHANNELS[name].precision == "half" else np.float32)
         assert np.array_equal(planes[name], framebuffer[name].astype(planes[name].dtype))
-    assert header["displayWindow"] == (0, 0, 149, 99)
-    assert header["dataWindow"] == ((10, 20, 99, 89) if region else (0, 0, 149, 99))
-    assert header["software"] == "clfractal 0.1.0"
-    assert (header["clfractalDevice"], header["clfractalPrecision"]) == ("PoCL", "float32")
-    assert (header["clfractalVersion"], header["clfractalSeconds"]) == ("0.1.0", 2.5)
-    assert np.array_equal(header["worldToCamera"], HEADER["worldToCamera"])
-    assert np.array_equal(header["worldToNDC"], np.eye(4))
+    wanted = {
+        "displayWindow": (0, 0, 149, 99),
+        "dataWindow": (10, 20, 99, 89) if region else (0, 0, 149, 99),
+        "software": "clfractal 0.1.0",
+        "clfractalDevice": "PoCL",
+        "clfractalPrecision": "float32",
+        "clfractalVersion": "0.1.0",
+        "clfractalSeconds": 2.5,
+        **{name: HEADER[name] for name in ("worldToCamera", "worldToNDC")},
+    }
+    np.testing.assert_equal({name: header[name] for name in wanted}, wanted)
     assert read_scene_text(tmp_path / "a.exr") == "version: 1\n"
     with Image.open(tmp_path / "a.png") as image:
         assert np.array_equal(np.asarray(image), framebuffer.to_rgb8())
-    texts = read_texts(tmp_path / "a.png")
-    assert texts["clfractal"] == "version: 1\n"
-    assert texts["Software"] == "clfractal 0.1.0"
-    assert texts["clfractalSeconds"] == "2.5"
+    told = {"clfractal": "version: 1\n", "Software": "clfractal 0.1.0", "clfractalSeconds": "2.5"}
+    assert read_texts(tmp_path / "a.png").items() >= told.items()
     assert sorted(entry.name for entry in tmp_path.iterdir()) == ["a.exr", "a.png"]
 
 

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import clfractal
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
 from tests.render.glass_scenes import ball
@@ -22,14 +21,7 @@ def test_media_absorb_along_the_chord(precision: str) -> None:
     """Glass that bends nothing: pixels have what Beer and Lambert's law leaves of white on a chord of the ball."""
     color, depth = np.array([0.9, 0.5, 0.1]), 0.8
     scene = ball(0, 1.0, transmission={"color": list(color), "depth": depth})
-    scene = scene.model_copy(update={"renderer": scene.surface.model_copy(update={"samples": 16})})
-    channels = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z")
-    film = clfractal.render(scene, channels=channels, precision=precision)
-    whole = np.asarray(film["A"]) == 1
-    found, normals = (
-        np.stack([film[name][whole] for name in names], axis=-1).astype(np.float64)
-        for names in (channels[:3], channels[4:])
-    )
+    found, normals, _ = seen(scene, 16, precision=precision)
     toward = normals - np.array([0, -4, 0])
     toward /= np.linalg.norm(toward, axis=1, keepdims=True)
     chord = -2 * (normals * toward).sum(axis=1)

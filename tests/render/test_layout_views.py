@@ -8,14 +8,12 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.engine.job_framebuffers import JobFramebuffers
-from clfractal.engine.run import run
 from clfractal.errors import SceneError
 from clfractal.scene.layout import Layout
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.render.layouts import GAP, VIEWS, scene_of
-from tests.render.shots import CHANNELS, engine_of, shoot, shoot_whole, stacked
+from tests.render.shots import CHANNELS, shoot, shoot_whole, stacked
 
 
 def alone(scene: Scene, number: int, size: tuple[int, int]) -> Scene:
@@ -89,24 +87,3 @@ def test_gaps_grow_with_the_picture(times: float, gap: int) -> None:
     left, right = layout.places(round(800 * times), round(400 * times), reference=400)
     assert right.x - left.x - left.width == gap
     assert left.x + right.x + right.width == round(800 * times)
-
-
-def test_progress_and_the_rest_of_a_film(device: Device) -> None:
-    """It grows to the number of tiles; rays of all views are counted; what is there stays, and is not rendered again."""
-    scene = scene_of(VIEWS, gap=3)
-    engine = engine_of(device)
-    job = engine.prepare(scene, precision="float32", channels=CHANNELS)
-    framebuffers = JobFramebuffers(job)
-    tile = framebuffers.framebuffers[0].grid.tile(0)
-    kept = np.full((len(CHANNELS), tile.height, tile.width), 7, np.float32)
-    framebuffers.framebuffers[0].put(0, kept)
-    seen: list[int] = []
-    state = run(job, framebuffers.framebuffers, engine.executor, progress=lambda p: seen.append(p.tiles_done))
-    assert seen == sorted(seen)
-    assert (state.tiles_done, state.tiles_before, state.tiles) == (6, 1, 6)
-    assert state.rays == 50 * (28 + 28 + 2 * 29) - tile.width * tile.height
-    framebuffer = framebuffers.picture()
-    assert (framebuffer["R"][: tile.height, : tile.width] == 7).all()
-    whole = shoot_whole(scene, device)
-    np.testing.assert_array_equal(framebuffer["R"][tile.height :], whole["R"][tile.height :])
-    np.testing.assert_array_equal(framebuffer["R"][:, tile.width :], whole["R"][:, tile.width :])

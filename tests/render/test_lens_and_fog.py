@@ -10,7 +10,6 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
-from tests.render.sequence import unit_squares
 from tests.render.shots import (
     BALL_RADIUS,
     ORTHOGRAPHIC,
@@ -170,28 +169,3 @@ def test_fog(
     misty = covered and density > 0
     behind = np.zeros_like(seen) if transparent else np.broadcast_to(MIST, seen.shape) if misty else sky
     np.testing.assert_allclose(seen[miss], behind[miss], atol=1e-6)
-
-
-@pytest.mark.parametrize("covered", [True, False])
-def test_fog_at_edges(device: Device, covered: bool) -> None:
-    """Every sample is fogged by itself; what is transparent stays so."""
-    density, samples = 0.5, 16
-    scene = fog_scene(ORTHOGRAPHIC, density, background="transparent", covered=covered, samples=samples)
-    framebuffer = shoot(scene, device)
-    expected, coverage = np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE))
-    across, below = unit_squares(SIDE, SIDE, samples, 0)
-    for n in range(samples):
-        origin, way, _ = rays(scene, across[..., n], below[..., n])
-        distance, nearest = to_sphere(origin, way, [0, 0, 0], BALL_RADIUS)
-        hit = nearest < BALL_RADIUS
-        through = np.exp(-density * np.where(hit, distance, 0))[..., None]
-        expected += np.where(hit[..., None], RED * through + MIST * (1 - through), 0) / samples
-        coverage += hit / samples
-    # But for rays that pass the ball within the hit distance.
-    sure = framebuffer["A"] == coverage
-    edge = sure & (coverage > 0) & (coverage < 1)
-    assert edge.sum() > 80
-    assert sure.mean() > 0.98
-    seen = stacked(framebuffer, ("R", "G", "B"))
-    np.testing.assert_allclose(seen[edge], expected[edge], atol=0.004)
-    np.testing.assert_allclose(seen[sure], expected[sure], atol=0.004)

@@ -9,35 +9,11 @@ from hypothesis import strategies as st
 
 from clfractal.device.structs import Precision
 from tests.render import normals_oracle as oracle
-from tests.render.normals_kernel import GRID, epsilon, lanes_of, run
+from tests.render.normals_kernel import GRID, lanes_of, run
 from tests.small_kernels import Floats
 
-# Places in 1/16 pixel and slopes in 1/8: float32 holds the heights of such planes without rounding.
-PLACES = st.lists(st.tuples(st.integers(-8, 8), st.integers(-8, 8), st.booleans()), min_size=1, max_size=64)
-SLOPES = st.tuples(st.integers(-8000, 8000), st.integers(-8000, 8000))
 # What a search may hand over, far beyond what it should.
 NUMBERS = st.floats(-1e12, 1e12) | st.sampled_from([0.0, 1.0, -1.0, 1e-7, 1e-20, 1e-38, 1e12])
-
-
-@given(st.sampled_from(["float32", "float64"]), PLACES, SLOPES, st.integers(-40, 30))
-def test_a_plane_from_any_of_its_points(
-    precision: Precision, places: list[tuple[int, int, bool]], slopes: tuple[int, int], power: int
-) -> None:
-    """Unless the points are on one line (in the picture) the plane through them has the normal, and no residual."""
-    offsets = np.array([place[:2] for place in places]) / 16
-    slope = np.array(slopes) / 8
-    points = np.concatenate([offsets, (offsets @ slope)[:, None]], axis=1)
-    chosen = np.array([place[2] for place in places])
-    found = run(points[None] * 2.0**power, chosen[None], precision, lanes_of(precision))
-    thin = oracle.thinness(points[chosen])
-    if abs(thin / oracle.THINNEST - 1) < 1e-3:
-        return
-    assert found.plane_usable[0] == (thin > oracle.THINNEST)
-    if found.plane_usable[0]:
-        normal = oracle.unit(np.array([-slope[0], -slope[1], 1.0]))
-        bound = 8 * epsilon(precision) / np.sqrt(thin)
-        assert np.abs(found.plane[0] - normal).max() <= bound
-        assert found.residual[0] * 2.0**-power <= bound
 
 
 @settings(max_examples=300)

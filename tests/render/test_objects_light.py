@@ -227,42 +227,6 @@ def test_a_closed_room_keeps_its_energy(device: Device, kind: str) -> None:
     np.testing.assert_allclose(colors(framebuffer), (1 - 0.5**8) / 0.5, rtol=2e-3)
 
 
-@pytest.mark.parametrize(
-    ("name", "material"),
-    [
-        ("matte", {"base": {"color": [0.6, 0.3, 0.2]}, "specular": {"weight": 0}}),
-        ("glossy", {"base": {"color": [0.2, 0.3, 0.6]}, "specular": {"roughness": 0.4}}),
-        ("rough metal", {"base": {"color": [0.9, 0.6, 0.3], "metalness": 1}, "specular": {"roughness": 0.5}}),
-        ("mirror", {"base": {"color": [0.9, 0.6, 0.3], "metalness": 1}, "specular": {"roughness": 0}}),
-    ],
-)
-def test_both_modes_show_an_object_about_alike(device: Device, name: str, material: dict[str, Any]) -> None:
-    """Under one light and a background that mirrors show."""
-    found = []
-    for mode in ("direct", "path"):
-        scene = scene_of(
-            NOWHERE,
-            ORTHOGRAPHIC,
-            (32, 32),
-            objects={"ball": {"type": "sphere", "radius": 0.9, "material": "it"}},
-            materials={"it": material},
-            material={"ambient": 0},
-            lights=[{"direction": [0.2, 0.8, -1]}],
-            lighting={"mode": mode},
-            renderer={"samples": 64, "firefly_limit": None},
-            background={"top": [0, 0, 0], "bottom": [0, 0, 0]},
-        )
-        framebuffer = shoot(scene, device)
-        found.append(colors(framebuffer)[framebuffer["A"] == 1])
-    direct, path = found
-    if name == "mirror":
-        # Nothing is around it.
-        assert max(direct.max(), np.median(path)) < 1e-3
-        return
-    np.testing.assert_allclose(direct.mean(axis=0), path.mean(axis=0), rtol=0.2)
-    assert np.corrcoef(direct[:, 0], path[:, 0])[0, 1] > 0.95
-
-
 def test_ambient_occlusion_is_not_used_along_paths(device: Device) -> None:
     found = []
     for occlusion in (None, {"rays": 4}):

@@ -214,28 +214,6 @@ def test_data_channels(device: Device, variant: Variant) -> None:
     assert np.linalg.norm(aside, axis=-1)[whole].max() < 2e-6
 
 
-@pytest.mark.parametrize("variant", [VARIANTS[1], VARIANTS[3]], ids=" ".join)
-def test_regions(device: Device, variant: Variant) -> None:
-    """A region is that part of the picture, bit for bit."""
-    part = stacked(shoot(scene_for(variant, "perspective"), device, region=(5, 9, 30, 21)))
-    np.testing.assert_array_equal(part, stacked(shot(device, variant, "perspective").framebuffer)[9:30, 5:35])
-
-
-@pytest.mark.parametrize("variant", [v for v in VARIANTS if v[2] == "stochastic"], ids=" ".join)
-def test_seed_chooses_the_points(device: Device, variant: Variant) -> None:
-    """Another seed, other points, which are known too; the same seed, the same."""
-    first, second = (shot(device, variant, "perspective", seed) for seed in (0, 5))
-    assert not np.array_equal(first.framebuffer["A"], second.framebuffer["A"])
-    assert np.abs(first.framebuffer["A"] - second.framebuffer["A"]).mean() < 0.02
-    inner = first.ball()[1] & second.ball()[1]
-    assert (points_of(first.framebuffer) != points_of(second.framebuffer)).any(-1)[inner].all()
-    places = np.stack([first.across, first.below], axis=-1)
-    assert not np.isclose(places[:, 1:], places[:, :-1], atol=1e-3).all((-2, -1)).any()
-    assert np.isclose(second.framebuffer["A"][inner], 1).all()
-    again = shoot(scene_for(variant, "perspective", 5), device)
-    np.testing.assert_array_equal(stacked(again), stacked(second.framebuffer))
-
-
 # The unit ball by its own distance, by an orbit's Jacobian and by its scalar rule.
 UNIT = {**SOLIDS, "let": {}, "shape": "sqrt(x*x + y*y + z*z) - 1"}
 

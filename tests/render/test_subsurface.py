@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-import clfractal
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
@@ -72,16 +71,10 @@ def test_dense_bodies_are_lamberts() -> None:
     color, toward = np.array([0.8, 0.5, 0.2]), np.array([0.6, -0.64, 0.48])
     material = skin(color=color.tolist(), radius=0.002, radius_scale=[1, 1, 1])
     lights = [{"direction": (-toward).tolist(), "intensity": 1}]
-    found = set_of(material, background=BLACK, lights=lights)
-    found = found.model_copy(update={"renderer": found.surface.model_copy(update={"samples": 64})})
-    film = clfractal.render(found, channels=("R", "G", "B", "A", "N.X", "N.Y", "N.Z"))
-    facing = sum(
-        np.asarray(film[f"N.{axis}"], float) * part for axis, part in zip("XYZ", toward, strict=True)
-    )
-    lit = (np.asarray(film["A"]) == 1) & (facing > 0.3)
+    colors, normals, _ = seen(set_of(material, background=BLACK, lights=lights), 64)
+    lit = normals @ toward > 0.3
     assert lit.sum() > 100
-    colors = np.stack([film[name] for name in "RGB"], axis=-1)[lit]
-    expected = color * facing[lit][:, None]
+    colors, expected = colors[lit], color * (normals @ toward)[lit, None]
     assert np.abs(colors.mean(axis=0) / expected.mean(axis=0) - 1).max() < 0.02
     assert np.abs(colors - expected).mean() < 0.06
 

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.scene.model import Scene
 from tests.render.sequence import unit_squares
 from tests.render.shots import (
     BALL_RADIUS,
@@ -16,7 +15,6 @@ from tests.render.shots import (
     ORTHOGRAPHIC,
     PERSPECTIVE,
     QUICK_BALL,
-    Floats,
     normals_of,
     points_of,
     rays,
@@ -64,39 +62,6 @@ def test_transparent(device: Device, samples: int) -> None:
     )
 
 
-@pytest.mark.parametrize("samples", [16, 64])
-def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None:
-    """Seen from infinity the ball is a disc. Independent samples would have a standard error of sqrt(p (1 - p) / N) in a
-    pixel that the disc covers by p; stratified ones halve it at least, and the whole area is better still."""
-    scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (48, 48), renderer={"detail": 0.01}, **FLAT)
-    coverage = shoot(scene, device, samples=samples, channels=("A",))["A"].astype(float)
-    fine = np.mean(
-        [
-            to_sphere(*rays(scene, (i + 0.5) / 32, (j + 0.5) / 32)[:2], (0, 0, 0), BALL_RADIUS)[1]
-            < BALL_RADIUS
-            for i in range(32)
-            for j in range(32)
-        ],
-        axis=0,
-    )
-    pixel = 2.6 / 48
-    _, middle = to_sphere(*rays(scene)[:2], (0, 0, 0), BALL_RADIUS)
-    rim = np.abs(middle - BALL_RADIUS) < 0.75 * pixel  # half a pixel's diagonal, and the hit distance
-    assert np.array_equal(coverage[~rim], fine[~rim])
-    assert rim.sum() > 100
-    # Ray by ray: only those that pass the ball within two hit distances may hit or not.
-    _, passing = to_sphere(*sample_rays(scene, *unit_squares(48, 48, samples, 0)), (0, 0, 0), BALL_RADIUS)
-    fewest, most = ((passing < BALL_RADIUS + reach).mean(axis=-1) for reach in (-1e-5, 0.02 * pixel + 1e-5))
-    assert (coverage >= fewest).all()
-    assert (coverage <= most).all()
-    error = (coverage - fine)[rim]
-    independent = np.sqrt((fine * (1 - fine))[rim].mean() / samples)
-    assert np.sqrt((error**2).mean()) < 0.5 * independent
-    # All of it; a ray that passes the ball within two hit distances may hit it too.
-    least, most = (np.pi * (BALL_RADIUS + 2 * detail * pixel) ** 2 for detail in (0, 0.01))
-    assert 0.9995 * least < coverage.sum() * pixel**2 < 1.0005 * most
-
-
 def test_averages_are_of_linear_light(device: Device) -> None:
     """A pixel half covered has the mean of the numbers in R, G, B, whatever the exposure of a PNG would be."""
     same = {"top": [0.1, 0.2, 3.0], "bottom": [0.1, 0.2, 3.0]}
@@ -140,9 +105,3 @@ def test_seed_and_region_of_samples(device: Device) -> None:
     assert np.abs(first[..., 3] - second[..., 3]).mean() < 0.02
     part = stacked(shoot(scenes[0], device, samples=4, region=(17, 5, 40, 33)))
     assert np.array_equal(part, first[5:38, 17:57])
-
-
-def sample_rays(scene: Scene, across: Floats, below: Floats) -> tuple[Floats, Floats]:
-    """Origins and directions of the rays at places of each pixel, shape (height, width, samples, 3)."""
-    shot = [rays(scene, across[..., n], below[..., n])[:2] for n in range(across.shape[-1])]
-    return np.stack([origin for origin, _ in shot], axis=2), np.stack([way for _, way in shot], axis=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,10 +13,8 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.tune import accepted_lanes
 from clfractal.engine import drawing
 from clfractal.engine import local_executor as local
-from clfractal.engine.run import Progress
 from clfractal.engine.stages import Span
-from clfractal.images.framebuffer import Framebuffer, in_memory
-from clfractal.images.store import JournalFramebuffer
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
@@ -77,11 +74,6 @@ SCENES: dict[str, Scene] = {
 def wholes(device: Device) -> dict[str, npt.NDArray[np.float32]]:
     """Each scene in one go."""
     return {name: stacked(shoot(scene, device)) for name, scene in SCENES.items()}
-
-
-@pytest.mark.parametrize("name", SCENES)
-def test_again(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
-    assert same(stacked(shoot(SCENES[name], device)), wholes[name])
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -213,34 +205,6 @@ def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.flo
     assert (result[marked.y :, marked.x :] == 7).all()
     result[marked.y :, marked.x :] = wholes["mandelbulb"][marked.y :, marked.x :]
     assert same(result, wholes["mandelbulb"])
-
-
-def test_interrupted_and_resumed(
-    device: Device,
-    wholes: dict[str, npt.NDArray[np.float32]],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
-    """A journal left by a render that ended after some tiles is continued to the same picture."""
-    monkeypatch.setattr(drawing, "CAPACITY", 1)
-    scene = SCENES["hast"]
-    plan = plan_of(scene, device)
-
-    def stop(progress: Progress) -> None:
-        if progress.tiles_done == 5:
-            raise KeyboardInterrupt
-
-    path = tmp_path / "picture.partial"
-    first = JournalFramebuffer(path, {"scene": "hast"}, plan.channels, SIZE, plan.region)
-    with pytest.raises(KeyboardInterrupt):
-        render_planned(scene, plan, device, first, progress=stop)
-    first.close()
-    again = JournalFramebuffer(path, {"scene": "hast"}, plan.channels, SIZE, plan.region, resume=True)
-    assert again.done.sum() == 5
-    render_planned(scene, plan, device, again)
-    assert again.done.all()
-    assert same(stacked(in_memory(again)), wholes["hast"])
-    again.discard()
 
 
 @pytest.mark.combination

@@ -7,8 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device
-from tests.render.shots import BALL, BALL_RADIUS, points_of, rays, shoot, view_of
+from tests.render.shots import BALL, rays, view_of
 from tests.scenes import scene_of
 
 CAMERAS: dict[str, dict[str, Any]] = {
@@ -39,15 +38,6 @@ def test_axes(camera: str, size: tuple[int, int]) -> None:
     assert np.linalg.norm(np.cross(to_target, view.axis)) == pytest.approx(0, abs=1e-12)
     assert view.width / size[0] == pytest.approx(view.height / size[1])
     assert view.pixel_size(size[1]) == pytest.approx(view.height / size[1])
-
-
-def test_field_of_view() -> None:
-    """The angle between the rays through the middles of the picture's upper and lower rim is the camera's."""
-    view = view_of(scene_of(BALL, CAMERAS["perspective"]))
-    assert view.eye is not None
-    rim = [view.center + sign * view.up * view.height / 2 - view.eye for sign in (1, -1)]
-    cosine = rim[0] @ rim[1] / np.linalg.norm(rim[0]) / np.linalg.norm(rim[1])
-    assert np.degrees(np.arccos(cosine)) == pytest.approx(48)
 
 
 @pytest.mark.parametrize("size", SIZES)
@@ -81,24 +71,3 @@ def test_world_to_ndc(camera: str, size: tuple[int, int]) -> None:
         where = projected[..., :2] / projected[..., 3:]
         expected = np.meshgrid((np.arange(width) + 0.5) / width, (np.arange(height) + 0.5) / height)
         np.testing.assert_allclose(where, np.stack(expected, axis=-1), atol=1e-12)
-
-
-@pytest.mark.parametrize("camera", CAMERAS)
-def test_rendered_points_are_where_their_pixels_are(device: Device, camera: str) -> None:
-    """P of every hit pixel, projected by the matrix in the file, is that pixel's centre; its depth is Z."""
-    scene = scene_of(BALL, CAMERAS[camera], (90, 40))
-    framebuffer = shoot(scene, device)
-    view = view_of(scene)
-    hit = framebuffer["A"] > 0
-    assert hit.sum() > 200
-    points = np.concatenate([points_of(framebuffer)[hit], np.ones((hit.sum(), 1))], axis=-1)
-    projected = points @ view.world_to_ndc()
-    pixels = projected[:, :2] / projected[:, 3:] * [90, 40]
-    rows, columns = np.nonzero(hit)
-    np.testing.assert_allclose(pixels, np.stack([columns + 0.5, rows + 0.5], axis=-1), atol=1e-3)
-    np.testing.assert_allclose((points @ view.world_to_camera())[:, 2], framebuffer["Z"][hit], atol=3e-6)
-    # And it is the near side of the ball.
-    origin = rays(scene)[0][hit]
-    assert (
-        np.linalg.norm(points[:, :3] - origin, axis=-1) < np.linalg.norm(origin, axis=-1) + BALL_RADIUS / 4
-    ).all()

@@ -30,9 +30,6 @@ def scene_of(**sections: Any) -> Scene:
     return scenes.scene_of(**{**usual, "lights": LIGHTS, **sections})
 
 
-BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}
-
-
 def shaded(look: dict[str, Any]) -> dict[str, Any]:
     """With shadows, as the other fog of this file: the same program."""
     return {**look, "lights": [{**light, "shadow": True} for light in look["lights"]]}
