@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.images.framebuffer import Framebuffer
 from tests.render.shots import CHANNELS
 
 
@@ -22,3 +23,10 @@ def close(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32]) -> None:
     assert difference.mean() < 0.001
     depth = CHANNELS.index("Z")
     assert (np.isfinite(a[..., depth]) != np.isfinite(b[..., depth])).mean() < 0.005
+
+
+def same_pictures(one: Framebuffer, other: Framebuffer) -> None:
+    """All channels bit for bit."""
+    assert one.channels == other.channels
+    for name in one.channels:
+        np.testing.assert_array_equal(one[name].view(np.uint32), other[name].view(np.uint32), name)

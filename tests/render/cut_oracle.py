@@ -8,14 +8,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.elements.shapes.box import BoxObject
 from clfractal.elements.shapes.sphere import SphereObject
-from clfractal.formulas import reference
-from clfractal.scene.cut_plane import CutPlane
 from clfractal.scene.model import Scene
-from clfractal.scene.palette import named_table
 from tests import scenes
-from tests.render.objects_oracle import rotation_of
+from tests.render.objects_oracle import span
+from tests.render.quads import escape_tint
 from tests.render.shots import BALL, Floats, to_sphere
 
 RADIUS = 4.0**0.125  # of the set, by three applications
@@ -66,6 +63,13 @@ def scene_of(**sections: Any) -> Scene:
     return scenes.scene_of(**{**usual, **sections})
 
 
+def solid_of(scene: Scene, name: str) -> Any:
+    """A body as a solid."""
+    return (
+        scene.objects[name] if name != "set" else SphereObject.checked({"type": "sphere", "radius": RADIUS})
+    )
+
+
 @dataclass
 class Met:
     """What rays meet first; `body` by its place in BODIES, -1: nothing; `plane`: that of the face, -1: no face; `sure`:
@@ -89,7 +93,7 @@ def first_met(scene: Scene, origin: Floats, direction: Floats, slack: float = 5e
         np.ones(shape, bool),
     )
     for body, name in enumerate(BODIES):
-        entry, exit_, normal = _span(scene, name, origin, direction)
+        (entry, normal), (exit_, _) = span(solid_of(scene, name), origin, direction)
         plane = np.full(shape, -1)
         for number, each in enumerate(scene.cut_planes):
             if not (each.cuts_set if name == "set" else name in each.cut_objects):
@@ -121,48 +125,10 @@ def face_tint(
     insides; and where the count is certain."""
     tint, sure = np.zeros(points.shape), np.ones(met.t.shape, bool)
     for number, each in enumerate(scene.cut_planes):
-        own, certain = _plane_tint(scene, each, points, rim)
+        own, near = escape_tint(scene, points, each.iterations or scene.formula.iterations, each.colors)
+        certain = near > rim
         of_set = ((met.plane == number) & (met.body == 0))[..., None]
         inside = ((met.plane == number) & (met.body > 0))[..., None]
         tint = np.where(of_set, own, np.where(inside, each.colors.inside, tint))
         sure &= ~of_set[..., 0] | certain
     return tint, sure
-
-
-def _plane_tint(
-    scene: Scene, each: CutPlane, points: Floats, rim: float
-) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    limit = each.iterations or scene.formula.iterations
-    flat = np.where(np.isfinite(points), points, 9).reshape(-1, 3)
-    count, inside = reference.escape(scene.chain, flat, limit)
-    table = named_table("magma").astype(float)
-    if not isinstance(each.colors.palette, str):
-        table = np.ones((256, 3))
-    at = np.clip(each.colors.scale * count / limit, 0, 1) * 255
-    tint = np.stack([np.interp(at, np.arange(256), table[:, i]) for i in range(3)], -1)
-    tint[inside] = each.colors.inside
-    rims = 4.0 ** (2.0 ** -np.arange(limit + 1))
-    certain = np.abs(np.linalg.norm(flat, axis=-1)[:, None] / rims - 1).min(-1) > rim
-    return tint.reshape(points.shape), certain.reshape(points.shape[:-1])
-
-
-def _span(scene: Scene, name: str, origin: Floats, direction: Floats) -> tuple[Floats, Floats, Floats]:
-    """Where rays enter and leave a whole body, and its normal where they enter."""
-    each = scene.objects.get(name)
-    if each is None or isinstance(each, SphereObject):
-        center = np.zeros(3) if each is None else np.array(each.position)
-        radius = RADIUS if each is None else each.radius
-        entry, nearest = to_sphere(origin, direction, center, radius)
-        half = np.sqrt(np.maximum(radius**2 - nearest**2, 0))
-        at = origin + np.where(np.isfinite(entry), entry, 0)[..., None] * direction
-        return entry, np.where(np.isfinite(entry), entry + 2 * half, -np.inf), (at - center) / radius
-    assert isinstance(each, BoxObject)
-    turned = rotation_of(each.rotation)
-    sides = np.array(each.half_sides)
-    o, d = (origin - np.array(each.position)) @ turned, direction @ turned
-    with np.errstate(divide="ignore"):
-        a, b = (-sides - o) / d, (sides - o) / d
-    low, high = np.minimum(a, b), np.maximum(a, b)
-    which = low.argmax(-1)
-    normal = -np.sign(np.take_along_axis(d, which[..., None], -1)) * np.eye(3)[which]
-    return low.max(-1), high.min(-1), normal @ turned.T

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from clfractal.files.exr import write_exr
 from clfractal.scene.model import Scene
 from tests import scenes
+from tests.environment_maps import write_map
 from tests.render.layouts import VIEWS
 from tests.render.shots import BALL, PERSPECTIVE
 from tests.render.volumes import keep, middles
@@ -25,11 +25,7 @@ def scene_of(folder: Path, **sections: Any) -> Scene:
 
 
 def lit_by_a_file(folder: Path) -> Scene:
-    sky = np.random.default_rng(3).random((3, 16, 32), dtype=np.float32)
-    band = dict(zip("RGB", sky, strict=True))
-    write_exr(
-        folder / "sky.exr", [band], display=(32, 16), region=(0, 0, 32, 16), channels=tuple("RGB"), half=()
-    )
+    write_map(folder / "sky.exr", np.random.default_rng(3).random((16, 32, 3), dtype=np.float32))
     return scene_of(
         folder,
         environment={"file": "sky.exr", "rays": 2},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -27,20 +28,24 @@ BESIDE: dict[str, Any] = {
 }
 
 
-def sizes(chain: Chain, points: Floats, applications: int) -> Floats:
-    """|z| after 1, 2, ... applications, shape (applications, n), of points of shape (n, 3)."""
+def orbit(chain: Chain, points: Floats, applications: int) -> Iterator[list[Floats]]:
+    """z after 1, 2, ... applications, of points of shape (n, 3)."""
     backend = NumpyBackend()
     columns: list[Any] = [np.array(column, float) for column in points.T]
     with np.errstate(all="ignore"):
         point = [np.broadcast_to(p, columns[0].shape) for p in space_to_state(chain, columns, backend)]
         state: list[Any] = [np.zeros_like(p) for p in point] if chain.add == "point" else list(point)
-        found = []
         for application in range(applications):
             bound = chain.link_at(application).bound
             mapped = apply(bound, state, constant_of(bound, point), backend)
             state = [np.broadcast_to(np.asarray(z, float), columns[0].shape).copy() for z in mapped]
-            found.append(np.sqrt(sum(z * z for z in state)))
-    return np.array(found)
+            yield state
+
+
+def sizes(chain: Chain, points: Floats, applications: int) -> Floats:
+    """|z| after 1, 2, ... applications, shape (applications, n), of points of shape (n, 3)."""
+    with np.errstate(all="ignore"):
+        return np.array([np.linalg.norm(z, axis=0) for z in orbit(chain, points, applications)])
 
 
 def slopes(chain: Chain, points: Floats, applications: int) -> Floats:

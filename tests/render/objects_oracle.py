@@ -44,7 +44,9 @@ def met(scene: Scene, origin: Floats, direction: Floats) -> tuple[Floats, Floats
     number = np.zeros(origin.shape[:-1])
     for index, each in enumerate(scene.objects.values()):
         if isinstance(each, Solid):
-            t, n = _solid(each, origin, direction)
+            (entry, outer), (exit_, inner) = span(each, origin, direction)
+            t, n = np.where(entry > 0, entry, exit_), np.where((entry > 0)[..., None], outer, inner)
+            t = np.where((entry < exit_) & (t > 0), t, np.inf)
         else:
             t, n = _level(each, origin, direction)
         n = np.where(((n * direction).sum(-1) > 0)[..., None], -n, n)
@@ -103,39 +105,21 @@ def _water(
     return np.where(np.isnan(high) | (last < 0), np.inf, high), over(np.nan_to_num(high))[1]
 
 
-def _solid(each: Solid, origin: Floats, direction: Floats) -> tuple[Floats, Floats]:
-    turned = rotation_of(each.rotation)
-    half = np.array(each.half_sides) * np.array(each.scale)
+def span(each: Solid, origin: Floats, direction: Floats) -> list[tuple[Floats, Floats]]:
+    """Where rays enter and leave a solid, and its normals there; they miss it where the first is not less."""
+    turned, half = rotation_of(each.rotation), np.array(each.half_sides) * np.array(each.scale)
     # In the frame of the solid, in scene units: lengths stay as they are.
     o, d = (origin - np.array(each.position)) @ turned, direction @ turned
+    # Within all of these q x x = 1: a ball, three pairs of planes, or a tube and a pair.
+    kinds = {SphereObject: [[1, 1, 1]], BoxObject: np.eye(3), CylinderObject: [[1, 1, 0], [0, 0, 1]]}
+    parts = np.array(kinds[type(each)]) / half**2
     with np.errstate(divide="ignore", invalid="ignore"):
-        if isinstance(each, SphereObject):
-            spans = [_quadric(o, d, 1 / half**2)]
-        elif isinstance(each, BoxObject):
-            spans = [_slab(o, d, half, axis) for axis in range(3)]
-        else:
-            assert isinstance(each, CylinderObject)
-            spans = [_quadric(o, d, np.array([1, 1, 0]) / half**2), _slab(o, d, half, 2)]
-    entry, exit_ = np.max([s[0] for s in spans], axis=0), np.min([s[1] for s in spans], axis=0)
-    outside = entry > 0
-    t = np.where(outside, entry, exit_)
-    t = np.where((entry < exit_) & (t > 0), t, np.inf)
-    p = o + np.where(np.isfinite(t), t, 0)[..., None] * d
-    if isinstance(each, SphereObject):
-        n = p / half**2
-    else:
-        # The part of the surface is the one whose span begins, or from inside ends, there.
-        which = np.where(outside, np.argmax([s[0] for s in spans], 0), np.argmin([s[1] for s in spans], 0))
-        n = np.zeros_like(p)
-        for part in range(len(spans)):
-            here = (which == part)[..., None]
-            if isinstance(each, CylinderObject) and part == 0:
-                n = np.where(here, p * np.array([1, 1, 0]) / half**2, n)
-            else:
-                axis = part if isinstance(each, BoxObject) else 2
-                n = np.where(here, p * np.eye(3)[axis], n)
-    n = n @ turned.T
-    return t, n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)
+        near, far = (np.array(roots) for roots in zip(*(_quadric(o, d, q) for q in parts), strict=True))
+    ends = []
+    for t, part in ((near.max(0), near.argmax(0)), (far.min(0), far.argmin(0))):
+        n = (o + np.where(np.isfinite(t), t, 0)[..., None] * d) * parts[part] @ turned.T
+        ends.append((t, n / np.maximum(np.linalg.norm(n, axis=-1, keepdims=True), 1e-12)))
+    return ends
 
 
 def _quadric(o: Floats, d: Floats, q: Floats) -> tuple[Floats, Floats]:
@@ -143,8 +127,3 @@ def _quadric(o: Floats, d: Floats, q: Floats) -> tuple[Floats, Floats]:
     root = np.sqrt(b * b - a * c)
     root = np.where(np.isnan(root), -np.inf, root)
     return (-b - root) / a, (-b + root) / a
-
-
-def _slab(o: Floats, d: Floats, half: Floats, axis: int) -> tuple[Floats, Floats]:
-    a, b = (-half[axis] - o[..., axis]) / d[..., axis], (half[axis] - o[..., axis]) / d[..., axis]
-    return np.minimum(a, b), np.maximum(a, b)

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.formulas import reference
-from clfractal.scene.cut_plane import CutPlane
+from clfractal.scene.cut_plane import CutPlane, EscapeColors
 from clfractal.scene.model import Scene
 from clfractal.scene.palette import named_table
 from tests.render.shots import Floats, rays
@@ -34,17 +34,20 @@ def plane(center: list[float], normal: list[float], opacity: float = 0.8, **keys
     return {"plane": place, "colors": COLORS, "opacity": opacity, **keys}
 
 
-def escape_tint(scene: Scene, points: Floats, limit: int = BALL_ITERATIONS) -> tuple[Floats, Floats]:
-    """The planes' colours at points, and how near to the rim of a ring they are, in parts of the radius."""
+def escape_tint(
+    scene: Scene, points: Floats, limit: int = BALL_ITERATIONS, colors: Any = None
+) -> tuple[Floats, Floats]:
+    """The planes' colours at points, magma's or white, and how near to the rim of a ring they are, in parts of the
+    radius."""
+    colors = colors or EscapeColors.checked(COLORS)
     flat = np.where(np.isfinite(points), points, 9).reshape(-1, 3)
     count, inside = reference.escape(scene.chain, flat, limit)
-    at = np.clip(1.5 * count / limit, 0, 1) * 255
-    table = named_table("magma").astype(float)
+    at = np.clip(colors.scale * count / limit, 0, 1) * 255
+    table = named_table("magma").astype(float) if colors.palette == "magma" else np.ones((256, 3))
     tint = np.stack([np.interp(at, np.arange(256), table[:, i]) for i in range(3)], -1)
-    tint[inside] = COLORS["inside"]
-    radius = np.linalg.norm(flat, axis=-1)
+    tint[inside] = colors.inside
     rims = 4.0 ** (2.0 ** -np.arange(limit + 1))
-    rim = np.abs(radius[:, None] / rims - 1).min(-1)
+    rim = np.abs(np.linalg.norm(flat, axis=-1)[:, None] / rims - 1).min(-1)
     return tint.reshape(points.shape), rim.reshape(points.shape[:-1])
 
 

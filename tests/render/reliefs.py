@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ Floats = npt.NDArray[np.float64]
 
 EYE = np.array([0.0, -4.0, 0.0])
 
-CHANNELS = tuple(f"{name}.{axis}" for name in ("N", "P", "normal") for axis in "XYZ")
+GROUPS = {name: [f"{name}.{axis}" for axis in "XYZ"] for name in ("N", "P", "normal")}
+GROUPS |= {"color": ["R", "G", "B"], "iterations": ["iterations"]}
 
 
 def relief(height: Any, width: float | None = None, **sections: Any) -> Scene:
@@ -33,13 +35,14 @@ def relief(height: Any, width: float | None = None, **sections: Any) -> Scene:
 
 
 def facts(scene: Scene, **options: Any) -> dict[str, Floats]:
-    """The surface's own normals (`N`), places (`P`) and the relief's normals (`normal`), shape (n, 3) each."""
-    film = clfractal.render(scene, channels=("A", *CHANNELS), **options)
+    """The surface's own normals (`N`), places (`P`), the relief's normals (`normal`), colours and counts of pixels that see
+    the set wholly, shape (n, 3) each, or (n, 1)."""
+    film = clfractal.render(scene, channels=("A", *chain(*GROUPS.values())), **options)
     whole = np.asarray(film["A"]) == 1
     assert whole.sum() > 300
     return {
-        name: np.stack([np.asarray(film[f"{name}.{axis}"], np.float64)[whole] for axis in "XYZ"], axis=-1)
-        for name in ("N", "P", "normal")
+        name: np.stack([np.asarray(film[each], np.float64)[whole] for each in names], axis=-1)
+        for name, names in GROUPS.items()
     }
 
 

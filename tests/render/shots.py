@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -202,3 +203,44 @@ def colors(framebuffer: Framebuffer) -> Floats:
 def degrees(a: npt.NDArray[Any], b: npt.NDArray[Any]) -> Floats:
     """The angle between vectors of length 1, however small."""
     return np.asarray(np.degrees(2 * np.arcsin(np.clip(np.linalg.norm(a - b, axis=-1) / 2, 0, 1))))
+
+
+@dataclass(frozen=True)
+class Beside:
+    """A picture beside what its rays meet by an oracle, in pixels in which both find something.
+
+    Attributes:
+        hit: the pixels of the picture that show something.
+        both: those in which the oracle does, too.
+        points: of the oracle, in all pixels.
+        off: how far the picture's places are from these.
+        turned: how far its normals, of length 1, are from the oracle's.
+        deep: how far its depths are from the oracle's, across a surface with that normal.
+    """
+
+    hit: npt.NDArray[np.bool_]
+    both: npt.NDArray[np.bool_]
+    points: Floats
+    off: Floats
+    turned: Floats
+    deep: Floats
+
+
+def beside(framebuffer: Framebuffer, scene: Scene, t: Floats, normal: Floats, most: int = 3) -> Beside:
+    """Distances t along rays, infinite where they meet nothing, and normals there. At a rim rays may go to either side: of
+    so many pixels one finds something, and the other does not."""
+    origin, direction, _ = rays(scene)
+    hit, right = framebuffer["A"] == 1, np.isfinite(t)
+    assert (hit != right).sum() <= most
+    both, view = hit & right, view_of(scene)
+    points = origin + np.where(both, t, 0)[..., None] * direction
+    depth = np.abs((points - view.origin) @ view.axis - framebuffer["Z"])
+    facing = np.abs((normal * direction).sum(-1))
+    return Beside(
+        hit,
+        both,
+        points,
+        np.linalg.norm(points_of(framebuffer) - points, axis=-1)[both],
+        np.linalg.norm(normals_of(framebuffer) - normal, axis=-1)[both],
+        (depth[both] * facing[both]),
+    )

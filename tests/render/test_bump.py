@@ -11,10 +11,12 @@ import pytest
 import clfractal
 from clfractal.device.select import choose
 from clfractal.device.structs import Precision
+from clfractal.formulas.catalog import load_chain
 from clfractal.integrators.points import distances
 from clfractal.scene.load import dump_scene
 from tests.devices import check_usable
 from tests.render.color_maps import BULB
+from tests.render.levels import orbit
 from tests.render.path_scenes import seen
 from tests.render.reliefs import EYE, Floats, displaced, facts, relief, unit
 from tests.render.shots import degrees
@@ -78,18 +80,11 @@ def differences(found: dict[str, Floats], width: float, height: Callable[[Floats
 
 def least_height(points: Floats, applications: int = 12) -> Floats:
     """The trap of `TRAP` on the ball of z^2 + 0: the least |z| of all applications."""
-    q = np.concatenate([points, np.zeros((len(points), 1))], axis=-1)
-    least = np.full(len(q), np.inf)
-    alive = np.linalg.norm(q, axis=-1) <= 4
-    for _ in range(applications):
-        a, rest = q[:, :1], q[:, 1:]
-        q = np.where(
-            alive[:, None],
-            np.concatenate([a * a - (rest**2).sum(axis=-1, keepdims=True), 2 * a * rest], -1),
-            q,
-        )
-        least = np.where(alive, np.minimum(least, np.abs(q[:, 2])), least)
-        alive &= np.linalg.norm(q, axis=-1) <= 4
+    chain = load_chain({"name": "quaternion_julia", "julia": [0, 0, 0, 0]})
+    least, alive = np.full(len(points), np.inf), np.linalg.norm(points, axis=-1) <= 4
+    for z in orbit(chain, points, applications):
+        least = np.where(alive, np.minimum(least, np.abs(z[2])), least)
+        alive &= np.linalg.norm(z, axis=0) <= 4
     return np.where(np.isfinite(least), least, np.abs(points[:, 2]))
 
 

@@ -6,12 +6,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import OpenEXR
 from PIL import Image
 
 import clfractal
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
+from tests.environment_maps import write_map
 from tests.render.reliefs import displaced, facts, relief
 from tests.render.shots import degrees
 
@@ -19,9 +19,7 @@ from tests.render.shots import degrees
 def waves(folder: Path, count: int = 256) -> None:
     """A picture of one wave to the right, whose numbers are as they are."""
     row = 0.5 + 0.5 * np.sin(2 * np.pi * (np.arange(count) + 0.5) / count)
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    pixels = np.tile(row.astype(np.float32), (count, 1))
-    OpenEXR.File(header, dict.fromkeys("RGB", pixels)).write(str(folder / "waves.exr"))
+    write_map(folder / "waves.exr", np.tile(row, (count, 1)))
 
 
 def floor(folder: Path, scale: float, **sections: Any) -> Scene:

@@ -11,14 +11,13 @@ from clfractal.device.select import Device
 from clfractal.formulas import reference
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
-from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
+from tests.render.cut_oracle import BODIES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
 
 ALBEDO = ("albedo.R", "albedo.G", "albedo.B")
 CHANNELS = (*(name for name in EVERY if name not in ("steps", "samples")), "object", *ALBEDO)
 MODES: dict[str, dict[str, Any]] = {"direct": {}, "path": {"lighting": {"mode": "path", "bounces": 0}}}
-FRONT = np.array(PLANES[0]["plane"]["normal"]) / np.linalg.norm(PLANES[0]["plane"]["normal"])
 
 
 def framebuffer_of(scene: Scene, device: Device, **settings: Any) -> Framebuffer:

@@ -20,6 +20,7 @@ from clfractal.scene.environment import EnvironmentMap, read_map
 from clfractal.scene.lighting import Environment
 from clfractal.shading.environment import COLUMNS, ROWS, PackedEnvironment, pack_environment, packed_map
 from tests.devices import check_usable
+from tests.environment_maps import blended, place
 from tests.render.environment_kernel import ask, every_variant, settings_of
 from tests.small_kernels import Floats
 
@@ -47,27 +48,6 @@ def random_directions(count: int, seed: int) -> Floats:
     tiny = np.array([[1e-7, -1, 0], [-1e-7, -1, 0], [0, -1e-9, 1], [1e-12, 0, -1], [0.0, -0.0, -1]])
     found[:11] = np.concatenate([axes, tiny])
     return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
-
-
-def place(directions: Floats, rotation: float = 0.0) -> tuple[Floats, Floats]:
-    """Parts of the picture's width and height: +y in the middle, +x right of it, +z at the top."""
-    turn = math.radians(rotation)
-    x = math.cos(turn) * directions[:, 0] + math.sin(turn) * directions[:, 1]
-    y = math.cos(turn) * directions[:, 1] - math.sin(turn) * directions[:, 0]
-    z = directions[:, 2]
-    return np.arctan2(x, y) / (2 * np.pi) + 0.5, 0.5 - np.arctan2(z, np.hypot(x, y)) / np.pi
-
-
-def blended(pixels: Floats, across: Floats, below: Floats) -> Floats:
-    """Linear between the pixels' middles; around the sides, but not over the poles."""
-    height, width, _ = pixels.shape
-    x, y = across * width - 0.5, np.clip(below * height - 0.5, 0, height - 1)
-    left, top = np.floor(x).astype(int), np.minimum(y.astype(int), height - 1)
-    s, t = (x - left)[:, None], (y - top)[:, None]
-    down = np.minimum(top + 1, height - 1)
-    upper = pixels[top, left % width] * (1 - s) + pixels[top, (left + 1) % width] * s
-    lower = pixels[down, left % width] * (1 - s) + pixels[down, (left + 1) % width] * s
-    return np.asarray(upper * (1 - t) + lower * t)
 
 
 def cells(packed: PackedEnvironment) -> tuple[Floats, Floats]:

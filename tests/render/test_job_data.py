@@ -7,7 +7,6 @@ import subprocess
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 import pytest
 
 from clfractal.device.select import Device
@@ -15,14 +14,13 @@ from clfractal.engine.job import Job
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import run
+from clfractal.images.framebuffer import Framebuffer
+from tests.render.bits import same_pictures
 from tests.render.job_scenes import SCENES, lit_by_a_file, scene_of
 from tests.render.shots import engine_of
 from tests.shell import command, environment
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "samples")
-
-Bits = dict[str, npt.NDArray[np.uint32]]
-
 
 # What a worker of another process does with a job.
 WORKER = """
@@ -40,18 +38,11 @@ np.savez(sys.argv[1], **{name: framebuffer[name] for name in framebuffer})
 """
 
 
-def rendered(job: Job, device: Device) -> Bits:
+def rendered(job: Job, device: Device) -> Framebuffer:
     """By an executor that has never seen anything."""
     framebuffers = JobFramebuffers(job)
     run(job, framebuffers.framebuffers, LocalExecutor(device))
-    framebuffer = framebuffers.picture()
-    return {name: framebuffer[name].view(np.uint32) for name in framebuffer}
-
-
-def same(found: Bits, expected: Bits) -> None:
-    assert found.keys() == expected.keys()
-    for name, plane in expected.items():
-        np.testing.assert_array_equal(found[name], plane, name)
+    return framebuffers.picture()
 
 
 def moved_away(folder: Path) -> None:
@@ -77,14 +68,14 @@ def test_a_copy_gives_the_same_bits(device: Device, tmp_path: Path, name: str) -
     assert copy.header()["scene"] == job.header()["scene"]
     for number in range(len(job.views)):
         assert copy.identity(number) == job.identity(number)
-    same(rendered(copy, device), expected)
+    same_pictures(rendered(copy, device), expected)
 
 
 def test_sent_after_it_was_rendered(device: Device, tmp_path: Path) -> None:
     """What a render leaves in a job's scenes (chains, maps, grids) travels too, or is made again."""
     job = engine_of(device).prepare(lit_by_a_file(tmp_path), channels=CHANNELS)
     expected = rendered(job, device)
-    same(rendered(pickle.loads(pickle.dumps(job)), device), expected)
+    same_pictures(rendered(pickle.loads(pickle.dumps(job)), device), expected)
 
 
 @pytest.mark.parametrize("name", ["environment", "texture", "volume", "layout"])
@@ -107,7 +98,8 @@ def test_another_process_gives_the_same_bits(device: Device, tmp_path: Path, nam
     )
     assert ended.returncode == 0, ended.stderr.decode()
     with np.load(elsewhere / "found.npz") as found:
-        same({channel: found[channel].view(np.uint32) for channel in found}, expected)
+        for channel in expected:
+            np.testing.assert_array_equal(found[channel].view(np.uint32), expected[channel].view(np.uint32))
 
 
 def test_a_job_takes_up_little_room(device: Device, tmp_path: Path) -> None:

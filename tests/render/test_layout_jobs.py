@@ -17,6 +17,7 @@ from clfractal.scene.layout import Place
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from tests.devices import check_usable
+from tests.render.bits import same_pictures
 from tests.render.layouts import GAP, VIEWS, scene_of
 from tests.render.shots import engine_of
 
@@ -35,13 +36,6 @@ def for_two_eyes() -> Scene:
     near = {**VIEWS[2], "camera": {"position": [1, -3, 1]}}
     plain = scene_of([*VIEWS[:2], near], SIZE, gap=4).resolved()
     return load_scene({**plain, "stereo": {"mode": "split", "separation": 0.5}})
-
-
-def same(found: Framebuffer, expected: Framebuffer) -> None:
-    """All channels bit for bit."""
-    assert found.channels == expected.channels
-    for name in expected:
-        np.testing.assert_array_equal(found[name].view(np.uint32), expected[name].view(np.uint32), name)
 
 
 def counted(device: Device, scene: Scene, **settings: Any) -> tuple[Framebuffer, Progress]:
@@ -68,14 +62,14 @@ class TestHeader:
         assert [renderer.type for renderer in renderers if renderer] == ["surface", "cut_plane", "volume"]
         assert [renderer.precision for renderer in renderers if renderer] == ["float32"] * 3
         again = engine_of(device).render(told)
-        same(again, first)
+        same_pictures(again, first)
         assert again.header["scene"] == first.header["scene"]
 
     def test_from_a_file(self, device: Device, tmp_path: Any) -> None:
         first = engine_of(device).render(layout(), channels=("R", "G", "B", "A", "Z"))
         for name in ("a.exr", "a.png"):
             first.save(tmp_path / name)
-            same(clfractal.render(clfractal.load_scene(tmp_path / name)), first)
+            same_pictures(clfractal.render(clfractal.load_scene(tmp_path / name)), first)
 
     def test_each_view_has_the_number_type_it_was_made_with(self, device: Device) -> None:
         """One that looks at a spot of 10^-9 needs float64; it is told, and the others stay."""
@@ -89,14 +83,14 @@ class TestHeader:
         found = [view.renderer.precision for view in told.layout.views if view.renderer]
         assert found == ["float32", "float64"]
         assert first.header["precision"] == "float32, float64"
-        same(engine_of(device).render(told), first)
+        same_pictures(engine_of(device).render(told), first)
 
     def test_of_both_eyes(self, device: Device) -> None:
         scene = for_two_eyes()
         first = engine_of(device).render(scene, channels=CHANNELS, samples=2)
         assert first["R"].shape == (SIZE[1], 2 * SIZE[0])
         assert (first["R"][:, : SIZE[0]] != first["R"][:, SIZE[0] :]).any()
-        same(engine_of(device).render(load_scene(first.header["scene"])), first)
+        same_pictures(engine_of(device).render(load_scene(first.header["scene"])), first)
 
 
 @pytest.fixture(scope="module")
@@ -202,7 +196,7 @@ class TestAsked:
         scene = scene_of([noisy, {}], SIZE)
         framebuffer = engine_of(device).render(scene, samples=8, channels=CHANNELS)
         assert framebuffer["samples"].max() == 8
-        same(engine_of(device).render(load_scene(framebuffer.header["scene"])), framebuffer)
+        same_pictures(engine_of(device).render(load_scene(framebuffer.header["scene"])), framebuffer)
 
     @pytest.mark.parametrize("precision", ["float32", "float64"])
     def test_precision(self, device: Device, precision: Precision) -> None:
@@ -221,4 +215,4 @@ class TestAsked:
         assert [view.plan.precision for view in job.views] == [precision] * 3
         found = engine_of(device).render(with_precision(other), precision=precision, channels=CHANNELS)
         assert found.header["precision"] == precision
-        same(found, engine_of(device).render(with_precision(precision), channels=CHANNELS))
+        same_pictures(found, engine_of(device).render(with_precision(precision), channels=CHANNELS))

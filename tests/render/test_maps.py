@@ -19,6 +19,7 @@ from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.shading.maps import level_sizes, levels_of
 from tests.devices import check_usable
+from tests.render import reliefs
 from tests.render.color_maps import BULB, Floats, ramp
 from tests.render.path_scenes import GREY, path, scene_of, seen
 from tests.variants import one_of
@@ -40,7 +41,7 @@ def shining(emission: dict[str, Any], **sections: Any) -> Scene:
             "lighting": path(),
             "materials": {"m": {**DARK, "emission": emission}},
             "material": {"name": "m"},
-            "renderer": {"detail": 0.01},
+            "renderer": {"samples": 1, "detail": 0.01},
             **sections,
         }
     )
@@ -48,31 +49,8 @@ def shining(emission: dict[str, Any], **sections: Any) -> Scene:
 
 def shown(scene: Scene, **options: Any) -> tuple[Floats, dict[str, Floats]]:
     """Colours, shape (n, 3), of the pixels that see the set; what else their only samples have found there."""
-    one = scene.model_copy(
-        update={"renderer": {"samples": 1, **(scene.renderer.model_dump(exclude_unset=True))}}
-    )
-    names = ("R", "G", "B", "A", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "iterations")
-    film = clfractal.render(one, channels=names, **options)
-    found = {name: np.asarray(film[name], np.float64) for name in names}
-    whole = found["A"] == 1
-    assert whole.sum() > 300
-    facts = {
-        "normal": np.stack([found[f"N.{axis}"][whole] for axis in "XYZ"], axis=-1),
-        "point": np.stack([found[f"P.{axis}"][whole] for axis in "XYZ"], axis=-1),
-        "iterations": found["iterations"][whole],
-    }
-    return np.stack([found[name][whole] for name in "RGB"], axis=-1), facts
-
-
-def quantity(by: str, facts: dict[str, Floats], vector: list[float]) -> Floats:
-    given = np.array(vector)
-    if by == "normal":
-        return np.asarray(facts["normal"] @ (given / np.linalg.norm(given)))
-    if by == "height":
-        return np.asarray(facts["point"] @ (given / np.linalg.norm(given)))
-    if by == "distance":
-        return np.asarray(np.linalg.norm(facts["point"] - given, axis=-1))
-    return facts["iterations"]
+    found = reliefs.facts(scene, **options)
+    return found["color"], found
 
 
 BY: dict[str, dict[str, Any]] = {
@@ -90,8 +68,13 @@ def test_colors_follow_quantities(by: str, precision: Precision) -> None:
         shining({"luminance": 1, "color": {"by": by, "palette": RAMP, **BY[by]}}), precision=precision
     )
     low, high = BY[by]["range"]
-    vector = BY[by].get("direction") or BY[by]["center"]
-    place = (quantity(by, facts, vector) - low) / (high - low)
+    vector = np.array(BY[by].get("direction") or BY[by]["center"])
+    known = {
+        "normal": facts["N"] @ vector / np.linalg.norm(vector),
+        "height": facts["P"] @ vector / np.linalg.norm(vector),
+        "distance": np.linalg.norm(facts["P"] - vector, axis=-1),
+    }
+    place = (known[by] - low) / (high - low)
     assert place.min() < 0.15
     assert place.max() > 0.8
     assert np.abs(colors - ramp(np.clip(place, 0, 1), RAMP)).max() < 0.005
@@ -100,7 +83,7 @@ def test_colors_follow_quantities(by: str, precision: Precision) -> None:
 def test_iterations_of_a_fractal() -> None:
     scene = shining({"luminance": 1, "color": {"by": "iterations", "range": [2, 5], "palette": RAMP}}, **BULB)
     colors, facts = shown(scene)
-    place = (facts["iterations"] - 2) / 3
+    place = (facts["iterations"][:, 0] - 2) / 3
     assert np.ptp(place) > 0.2
     assert np.abs(colors - ramp(np.clip(place, 0, 1), RAMP)).max() < 0.004
 
@@ -110,7 +93,7 @@ def test_numbers_follow_curves() -> None:
     scene = shining({"luminance": {"by": "normal", "curve": curve}, "color": [1, 0.5, 0.25]})
     colors, facts = shown(scene)
     at, values = zip(*curve, strict=True)
-    expected = np.interp((facts["normal"][:, 2] + 1) / 2, at, values)
+    expected = np.interp((facts["N"][:, 2] + 1) / 2, at, values)
     assert np.abs(colors - expected[:, None] * [1, 0.5, 0.25]).max() < 0.005
 
 
@@ -118,7 +101,7 @@ def test_a_map_repeats() -> None:
     """With `repeat` the last colour blends into the first, in the last 256th."""
     color = {"by": "normal", "range": [0, 0.25], "repeat": True, "palette": [[0, 0, 0], [1, 1, 1]]}
     colors, facts = shown(shining({"luminance": 1, "color": color}))
-    place = (facts["normal"][:, 2] / 0.25) % 1
+    place = (facts["N"][:, 2] / 0.25) % 1
     inside = (place > 0.02) & (place < 0.98)
     assert np.abs(colors[inside, 0] - place[inside] * 256 / 255).max() < 0.01
 
@@ -171,8 +154,10 @@ def test_a_mask_mixes_what_its_parts_shine() -> None:
         "b": {**DARK, "emission": {"luminance": 4, "color": [0, 0, 1]}},
         "m": {"blend": ["a", "b"], "mask": {"by": "normal", "range": [0, 0.5]}},
     }
-    colors, facts = shown(scene_of(lighting=path(), materials=parts, material={"name": "m"}))
-    share = np.clip(facts["normal"][:, 2] / 0.5, 0, 1)
+    colors, facts = shown(
+        scene_of(lighting=path(), materials=parts, material={"name": "m"}, renderer={"samples": 1})
+    )
+    share = np.clip(facts["N"][:, 2] / 0.5, 0, 1)
     assert np.abs(colors[:, 0] - 2 * (1 - share)).max() < 0.02
     assert np.abs(colors[:, 2] - 4 * share).max() < 0.04
 
@@ -205,8 +190,8 @@ def look_up(pixels: Floats, u: Floats, v: Floats) -> Floats:
 
 
 def from_three_sides(pixels: Floats, facts: dict[str, Floats], scale: float, sharpness: float) -> Floats:
-    p, high = facts["point"] / scale, facts["point"] / scale * pixels.shape[1] / pixels.shape[0]
-    weights = np.abs(facts["normal"]) ** sharpness
+    p, high = facts["P"] / scale, facts["P"] / scale * pixels.shape[1] / pixels.shape[0]
+    weights = np.abs(facts["N"]) ** sharpness
     weights /= weights.sum(axis=1, keepdims=True)
     sides = (
         look_up(pixels, p[:, 1], -high[:, 2]),

@@ -17,7 +17,7 @@ from clfractal.scene.named_files import volumes_of
 from clfractal.scene.object_grids import placed
 from tests import scenes
 from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import PERSPECTIVE, Floats, normals_of, points_of, rays, shoot, to_sphere
+from tests.render.shots import PERSPECTIVE, Floats, beside, normals_of, points_of, rays, shoot, to_sphere
 from tests.render.volumes import keep, middles, own_rays, to_box, value_at
 
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "position": [0.1, 0.2, -0.1], "scale": [1, 1.3, 0.8]}
@@ -116,23 +116,14 @@ def test_a_rough_grid_is_met_where_its_values_pass_the_level(
     device: Device, folder: Path, precision: Precision, lanes: int | None, error: float
 ) -> None:
     scene = scene_of(folder, {"file": "rough.nrrd", "level": ROUGH_LEVEL, **TURNED})
-    framebuffer = shoot(scene, device, precision, **({"lanes": lanes} if lanes else {}))
     t, normal = met(scene, ROUGH, ROUGH_LEVEL)
-    hit = framebuffer["A"] == 1
-    expected = np.isfinite(t)
-    both = hit & expected
-    assert 500 < both.sum() < both.size - 300
-    # A ray that only just meets something may go either way.
-    assert (hit != expected).sum() <= 3
-    origin, direction, _ = rays(scene)
-    points = origin + np.where(both, t, 0)[..., None] * direction
-    off = np.linalg.norm(points_of(framebuffer) - points, axis=-1)[both]
+    found = beside(shoot(scene, device, precision, lanes=lanes), scene, t, facing(normal, scene))
+    assert 500 < found.both.sum() < found.both.size - 300
     # (The search by NumPy may miss what is thinner than its steps.)
-    assert (off > 10 * error).mean() < 0.01
-    assert np.median(off) < error
-    turned = np.linalg.norm(normals_of(framebuffer) - facing(normal, scene), axis=-1)[both]
-    assert (turned > 2e-3).mean() < 0.01
-    assert np.median(turned) < 2e-5
+    assert (found.off > 10 * error).mean() < 0.01
+    assert np.median(found.off) < error
+    assert (found.turned > 2e-3).mean() < 0.01
+    assert np.median(found.turned) < 2e-5
 
 
 def test_values_that_grow_along_a_direction_have_a_plane(device: Device, folder: Path) -> None:

@@ -7,21 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
-import OpenEXR
 import pytest
 
 import clfractal
+from tests.environment_maps import irradiance, write_map
 from tests.render.path_scenes import GREY, path, scene_of, seen
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
-
-
-def save_map(path: Path, pixels: npt.NDArray[np.float32]) -> None:
-    """A grey environment map."""
-    header = {"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage}
-    OpenEXR.File(header, dict.fromkeys("RGB", pixels)).write(str(path))
 
 
 @pytest.mark.parametrize(
@@ -101,7 +94,7 @@ def test_light_that_bounces_adds_up(roulette: int, surroundings: str, tmp_path: 
     shining = {"base": {"color": [0.5, 0.5, 0.5]}, "specular": {"weight": 0}, "emission": {"luminance": 0.5}}
     sections: dict[str, Any] = {"background": GREY}
     if surroundings == "environment":
-        save_map(tmp_path / "white.exr", np.ones((8, 16), np.float32))
+        write_map(tmp_path / "white.exr", 1.0)
         sections = {"environment": {"file": "white.exr"}}
     values = scene_of(
         formula={"name": "menger_sponge", "iterations": 3},
@@ -135,19 +128,13 @@ def test_environments_are_asked_and_met(tmp_path: Path) -> None:
     """A small bright spot in a map lights a Lambert ball with its irradiance, whether it is asked or met."""
     pixels = np.full((64, 128), 0.05, np.float32)
     pixels[16:20, 30:34] = 60.0
-    save_map(tmp_path / "spot.exr", pixels)
+    write_map(tmp_path / "spot.exr", pixels)
     scene = scene_of(lighting=path(0), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}).placed(
         tmp_path
     )
     scene = scene.model_copy(update={"environment": {"file": "spot.exr", "background": False}})
     colors, normals, _ = seen(scene, 64)
-    latitude = math.pi * (np.arange(64) + 0.5) / 64
-    longitude = 2 * math.pi * ((np.arange(128) + 0.5) / 128 - 0.5)
-    z, level = np.cos(latitude)[:, None], np.sin(latitude)[:, None]
-    toward = np.stack(np.broadcast_arrays(level * np.sin(longitude), level * np.cos(longitude), z), axis=-1)
-    areas = np.broadcast_to(level * (math.pi / 64) * (2 * math.pi / 128), pixels.shape)
-    cosine = np.maximum(normals @ toward.reshape(-1, 3).T, 0)
-    expected = cosine @ (pixels * areas).reshape(-1) / math.pi
+    expected = irradiance(pixels, normals)[:, 0]
     usable = expected > 0.2
     assert usable.sum() > 100
     assert abs((colors[usable, 0] / expected[usable]).mean() - 1) < 0.02

@@ -12,11 +12,11 @@ import png
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.files.exr import write_exr
 from clfractal.files.srgb import encode
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.outputs import save_outputs
 from clfractal.scene.model import Scene
+from tests.environment_maps import write_map
 from tests.render.programs import compile_all
 from tests.render.sequence import unit_squares
 from tests.render.shots import (
@@ -166,10 +166,7 @@ def sun_scene(folder: Path, sun: float, limit: float | None, **sections: Any) ->
     """A matt or mirroring ball under an even sky with a small sun of another colour."""
     sky = np.full((16, 32, 3), [0.3, 0.4, 0.5], np.float32)
     sky[4:6, 9:11] = np.array([1, 0.8, 0.5]) * sun
-    path = folder / f"sun{sun:g}.exr"
-    size = (32, 16)
-    bands = [{name: sky[..., i] for i, name in enumerate(RGB)}]
-    write_exr(path, bands, display=size, region=(0, 0, *size), channels=RGB, half=())
+    path = write_map(folder / f"sun{sun:g}.exr", sky)
     renderer = {"firefly_limit": limit, "bounces": 1, "detail": 0.05, **sections.pop("renderer", {})}
     usual = {"environment": {"file": path.name, "rays": 4}, "renderer": renderer, "lights": []}
     return scene_of(BALL, PERSPECTIVE, (SIDE, SIDE), folder=folder, **{**usual, **sections})

@@ -18,11 +18,11 @@ from clfractal.camera.views import View
 from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError
-from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import shutter as shutters
 from clfractal.integrators.shutter import Shutter, shutter_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
+from tests.render.bits import same_pictures
 from tests.render.shots import BALL, BALL_RADIUS, Floats
 from tests.scenes import BALL_ITERATIONS
 from tests.variants import combinations, one_of
@@ -68,12 +68,6 @@ def shutter_at(scene: Scene) -> Shutter:
 @pytest.fixture(scope="module")
 def engine() -> Engine:
     return Engine()
-
-
-def same(one: Framebuffer, other: Framebuffer) -> None:
-    assert one.channels == other.channels
-    for name in one.channels:
-        np.testing.assert_array_equal(one[name], other[name], name)
 
 
 # -- when the shutter is open
@@ -168,7 +162,7 @@ def test_a_disk_that_crosses_the_picture_covers_its_way(engine: Engine) -> None:
 
 def test_one_sample_has_the_scene_in_the_middle_of_the_time(engine: Engine) -> None:
     blurred = engine.render(clfractal.at_frame(film_of(DIMMING), 3), samples=1)
-    same(
+    same_pictures(
         blurred,
         engine.render(clfractal.at_frame(film_of(DIMMING, animation={"shutter": 0}), 3.25), samples=1),
     )
@@ -180,7 +174,9 @@ def test_a_frame_in_which_nothing_moves_is_the_still(engine: Engine) -> None:
     assert job.views[0].shutter is None
     assert engine.prepare(clfractal.at_frame(film_of(resting), 6)).views[0].plan.moving
     sharp = film_of(resting, animation={"shutter": 0})
-    same(engine.render(clfractal.at_frame(film_of(resting), 2)), engine.render(clfractal.at_frame(sharp, 2)))
+    same_pictures(
+        engine.render(clfractal.at_frame(film_of(resting), 2)), engine.render(clfractal.at_frame(sharp, 2))
+    )
 
 
 STEREO = {"mode": "pair", "screen_width": 0.5, "screen_distance": 0.7}
@@ -219,7 +215,7 @@ def test_passes_and_tiles_make_no_difference(kind: str, engine: Engine) -> None:
     samples = 6 if kind != "noise" else None
     whole = engine.render(scene, samples=samples)
     *_, last = engine.refine(scene, samples=samples)
-    same(whole, last)
+    same_pictures(whole, last)
     x, y, width, height = 37, 9, 13, 17
     part = engine.render(scene, samples=samples, region=(x, y, width, height))
     for name in part.channels:
@@ -249,7 +245,7 @@ def test_eyes_see_the_same_time(engine: Engine) -> None:
     scene = film_of(PANNING, stereo={**STEREO, "separation": 0})
     perspective = {**scene, "camera": {"position": [0, -3, 0], "fov": 50}}
     left, right = engine.render_pair(clfractal.at_frame(perspective, 1), samples=4)
-    same(left, right)
+    same_pictures(left, right)
     still = engine.render_pair(
         clfractal.at_frame({**perspective, "animation": {**scene["animation"], "shutter": 0}}, 1)
     )
@@ -265,7 +261,7 @@ def test_a_picture_holds_what_it_takes_to_make_it_again(tmp_path: Path, engine: 
     found = load_scene(tmp_path / "frame.exr")
     assert found.animation is not None
     assert found.animation.frame == 4
-    same(film, engine.render(found))
+    same_pictures(film, engine.render(found))
     assert load_scene(dump_scene(found)) == found
 
 
@@ -273,7 +269,7 @@ def test_a_scene_may_say_which_frame_its_still_shows(engine: Engine) -> None:
     film = film_of(PANNING, animation={"shutter": 0})
     still = load_scene(film, overrides=["animation.frame=4"])
     assert still.camera.position == (7, -3, 0)
-    same(engine.render(still), engine.render(clfractal.at_frame(film, 4)))
+    same_pictures(engine.render(still), engine.render(clfractal.at_frame(film, 4)))
 
 
 def identity(job: Job) -> dict[str, Any]:

@@ -16,11 +16,11 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.files import resources
 from clfractal.files.environment_map import read_environment
-from clfractal.files.exr import write_exr
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.march import march_record
 from clfractal.integrators.records import HemisphereRays, hemisphere_rays
 from clfractal.scene.model import Scene
+from tests.environment_maps import blended, irradiance, place, write_map
 from tests.render.known_lights import BRIGHT, ground
 from tests.render.shots import (
     BALL,
@@ -156,22 +156,6 @@ def shipped(name: str) -> Floats:
     return np.asarray(read_environment(resources.folder("environments") / f"{name}.exr"), np.float64)
 
 
-def look_up(pixels: Floats, direction: Floats, rotation: float) -> Floats:
-    """The map, blended between its pixels: top row +z, middle column +y, to its right +x; `rotation` about z."""
-    height, width, _ = pixels.shape
-    azimuth = np.arctan2(direction[..., 0], direction[..., 1]) + np.radians(rotation)
-    elevation = np.arcsin(np.clip(direction[..., 2], -1, 1))
-    x = (0.5 + azimuth / (2 * np.pi)) * width - 0.5
-    y = np.clip((0.5 - elevation / np.pi) * height - 0.5, 0, height - 1)
-    left, top = np.floor(x).astype(int), np.minimum(np.floor(y).astype(int), height - 2)
-    right, below = (x - left)[..., None], (y - top)[..., None]
-    rows = [
-        pixels[row, left % width] * (1 - right) + pixels[row, (left + 1) % width] * right
-        for row in (top, top + 1)
-    ]
-    return np.asarray(rows[0] * (1 - below) + rows[1] * below)
-
-
 @pytest.mark.parametrize("rotation", [0.0, 70.0])
 @pytest.mark.parametrize("count", [0, 1])
 def test_what_is_mirrored_and_seen_is_the_environment(
@@ -187,7 +171,7 @@ def test_what_is_mirrored_and_seen_is_the_environment(
     normal = normals_of(framebuffer)
     mirrored = direction - 2 * (direction * normal).sum(-1, keepdims=True) * normal
     toward = np.where(hit[..., None], mirrored, direction)
-    expected = look_up(shipped("dusk"), toward, rotation)
+    expected = blended(shipped("dusk"), *place(toward, rotation))
     assert 0.2 < hit.mean() < 0.8
     assert (np.abs(colors(framebuffer) - expected) <= 0.005 + 0.02 * expected).mean() > 0.999
     assert (np.abs(colors(framebuffer) - expected) <= 0.01 + 0.1 * expected).all()
@@ -220,15 +204,7 @@ def test_under_a_white_sky_a_ball_has_its_own_colour(
     device: Device, tmp_path: Path, reflection: float
 ) -> None:
     """A uniform map of brightness 1 gives `diffuse` times the colour, and a mirror shows 1."""
-    white = np.ones((8, 16), np.float32)
-    write_exr(
-        tmp_path / "white.exr",
-        [{"R": white, "G": white, "B": white}],
-        display=(16, 8),
-        region=(0, 0, 16, 8),
-        channels="RGB",
-        half="RGB",
-    )
+    write_map(tmp_path / "white.exr", 1.0)
     scene = environment_scene(tmp_path, {"file": "white.exr", "rays": 32}, reflection, bounces=2, samples=4)
     framebuffer = shoot(scene, device)
     inside = framebuffer["A"] == 1
@@ -238,18 +214,6 @@ def test_under_a_white_sky_a_ball_has_its_own_colour(
         colors(framebuffer)[inside], np.broadcast_to(expected, (inside.sum(), 3)), rtol=0.12
     )
     np.testing.assert_allclose(colors(framebuffer)[framebuffer["A"] == 0], 1.0, atol=1e-5)
-
-
-def irradiance(pixels: Floats, normals: Floats) -> Floats:
-    """Light from all sides by the cosine to a normal, over pi: the map's pixels summed by their solid angles."""
-    height, width, _ = pixels.shape
-    rows, columns = (np.arange(height) + 0.5) / height, (np.arange(width) + 0.5) / width
-    azimuth, elevation = (2 * columns - 1) * np.pi, (0.5 - rows) * np.pi
-    level, up = np.broadcast_arrays(np.cos(elevation)[:, None], np.sin(elevation)[:, None])
-    ways = np.stack(np.broadcast_arrays(level * np.sin(azimuth), level * np.cos(azimuth), up), -1)
-    part = level * np.ones(width) * (np.pi / height) * (2 * np.pi / width)
-    cosine = np.maximum(normals @ ways.reshape(-1, 3).T, 0)
-    return np.asarray(cosine @ (part[..., None] * pixels).reshape(-1, 3) / np.pi)
 
 
 @pytest.mark.parametrize(

@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.formulas import reference
 from clfractal.scene.model import Scene
 from clfractal.shading.kind_numbers import TRAPS
+from tests.render.levels import orbit
 from tests.render.shots import PERSPECTIVE
 from tests.scenes import scene_of
 
@@ -29,31 +29,23 @@ def trap_scene(name: str) -> Scene:
     return scene_of(formula, PERSPECTIVE, coloring={"by": "trap", "trap": TRAP})
 
 
-def trap_distances(z: npt.ArrayLike) -> list[float]:
-    """From a point in z to the shapes of TRAP, in the order of TRAPS."""
+def trap_distances(z: npt.ArrayLike) -> Floats:
+    """From points (..., 3) in z to the shapes of TRAP, in the order of TRAPS."""
     offset, axis = np.asarray(z) - TRAP["center"], np.array(TRAP["direction"]) / 3
-    reach, along = float(np.linalg.norm(offset)), float(offset @ axis)
+    reach, along = np.linalg.norm(offset, axis=-1), offset @ axis
     found = {
         "point": reach,
-        "axis": float(np.linalg.norm(np.cross(offset, axis))),
-        "plane": abs(along),
-        "sphere": abs(reach - TRAP["radius"]),
+        "axis": np.linalg.norm(np.cross(offset, axis), axis=-1),
+        "plane": np.abs(along),
+        "sphere": np.abs(reach - TRAP["radius"]),
     }
-    return [found[shape] for shape in TRAPS]
+    return np.array([found[shape] for shape in TRAPS])
 
 
 def trap_by_numpy(scene: Scene, points: Floats) -> Floats:
-    """Smallest distance of z_1, z_2, ... to each shape of TRAP, shape (4, n)."""
-    chain, backend = scene.chain, reference.NumpyBackend()
-    result = np.full((4, len(points)), np.inf)
-    with np.errstate(all="ignore"):
-        for index, point in enumerate(points):
-            place = [np.float64(x) for x in reference.space_to_state(chain, list(point), backend)]
-            z = [np.float64(0.0) for _ in place] if chain.add == "point" else list(place)
-            for n in range(scene.formula.iterations):
-                if np.linalg.norm(z) > chain.bailout:
-                    break
-                bound = chain.link_at(n).bound
-                z = reference.apply(bound, z, reference.constant_of(bound, place), backend)
-                result[:, index] = np.minimum(result[:, index], trap_distances(z[:3]))
+    """Smallest distance of z_1, z_2, ... to each shape of TRAP, shape (4, n); of points that are within the bailout."""
+    result, alive = np.full((len(TRAPS), len(points)), np.inf), np.ones(len(points), bool)
+    for z in orbit(scene.chain, points, scene.formula.iterations):
+        result = np.where(alive, np.minimum(result, trap_distances(np.stack(z[:3], axis=-1))), result)
+        alive &= np.linalg.norm(z, axis=0) <= scene.chain.bailout
     return result
