@@ -14,21 +14,21 @@ CONCERNS = """
 kernels/formulas/numbers/*: numbers/ formulas/distance render/surface_analytic
 kernels/*/show*: engine/show engine/smoothing viewer/display
 kernels/images/canvas.cl: engine/canvas viewer/session
-kernels/integrators/cut_plane.cl: render/cut_plane render/cut_plane_periods
-kernels/*/escape*.h: render/cut_plane formulas/counts render/cut_plane_periods
+kernels/integrators/cut_plane.cl: render/cut_plane
+kernels/*/escape*.h: render/cut_plane formulas/counts
 kernels/*planes*: render/planes_in_picture render/planes_in_fog
 kernels/shading/environment.h: render/environment_kernel render/surface_rays
 kernels/shading/sun.h: render/sun
-kernels/integrators/march/normals.h: render/normals render/normals_properties render/pixel_points
-kernels/integrators/march/pixel_points.h: render/pixel_points render/normals render/normals_properties
-kernels/integrators/sampling.h: render/sampling render/filters render/surface_rays render/lens_and_fog
+kernels/integrators/march/normals.h: render/normals render/pixel_points
+kernels/integrators/march/pixel_points.h: render/pixel_points render/normals
+kernels/integrators/sampling.h: render/sampling render/reconstruction render/surface_rays render/lens_and_fog
 kernels/*/color[_i]*: render/coloring render/surface_light
-kernels/shading/color.h: render/coloring render/cut_plane render/surface_samples
+kernels/shading/color.h: render/coloring render/cut_plane render/reconstruction
 kernels/integrators/camera.h: render/surface_analytic render/lens_and_fog render/stereo_views
 kernels/integrators/interaction.h: render/coloring render/lens_and_fog render/normals render/surface_light
 kernels/*/sh*.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
 kernels/integrators/secondary.h: render/surface_rays render/surface_light
-kernels/integrators/wide_lights.h: render/surface_rays render/surface_light render/light_shapes
+kernels/integrators/wide_lights.h: render/surface_rays render/surface_light
 kernels/integrators/march/queue.h: render/surface_rays render/pixel_points
 kernels/integrators/eye.h: render/surface_analytic render/lens_and_fog render/surface_rays
 kernels/integrators/lit.h: render/surface_light render/surface_rays render/lens_and_fog render/planes_in_fog
@@ -37,28 +37,28 @@ kernels/*/surface*: render/surface_light render/surface_rays render/pixel_points
 kernels/geometry/objects.h: render/objects render/objects_light
 kernels/*/shape*: render/objects render/joined render/emitter_places
 kernels/elements/shapes/*: render/objects render/joined render/emitter_places
-kernels/elements/materials/*: render/materials render/layers render/glass
+kernels/elements/materials/*: render/materials render/layers render/glass render/furnaces
 kernels/geometry/object_grids.h: render/object_grids render/turned_grids
 kernels/geometry/clouds.h: render/clouds
 kernels/shading/medium_event.h: render/clouds render/volume_paths
 kernels/integrators/volume/volume_bounds.h: render/volume_paths
 clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/blocks
 kernels/*/emitter*.h: render/emitter_places render/emitters
-kernels/geometry/rectangles.h: render/rectangles render/emitter_places render/light_shapes
-kernels/shading/light_sampling.h: render/emitters render/light_shapes render/paths
-kernels/shading/incidence.h: render/light_shapes render/surface_light
-kernels/shading/light_at.h: render/light_shapes render/surface_light
-kernels/elements/lights/*: render/light_shapes render/surface_light render/rectangles
-kernels/shading/media.h: render/glass_objects
-kernels/integrators/glass_paths.h: render/glass_paths render/glass_objects
-kernels/shading/participating_media.h: render/participating_media
-kernels/shading/bump.h: render/bump
-kernels/shading/bsdf_bumped.h: render/bumped_materials
-kernels/integrators/events.h: render/clouds render/paths render/subsurface
+kernels/geometry/rectangles.h: render/emitter_places render/surface_light
+kernels/shading/light_sampling.h: render/emitters render/surface_light render/paths
+kernels/shading/incidence.h: render/surface_light
+kernels/shading/light_at.h: render/surface_light
+kernels/elements/lights/*: render/surface_light render/emitter_places
+kernels/shading/media.h: render/glass_objects render/furnaces
+kernels/integrators/glass_paths.h: render/glass_objects render/furnaces
+kernels/shading/participating_media.h: render/participating_media render/furnaces
+kernels/shading/bump.h: render/bump render/furnaces
+kernels/shading/bsdf_bumped.h: render/materials
+kernels/integrators/events.h: render/clouds render/paths render/participating_media render/furnaces
 kernels/geometry/water.h: render/objects
 kernels/shading/phong_material.h: render/objects_light render/surface_light
 kernels/integrators/march/march_steps.h: render/searches
-kernels/*/march*: render/surface_analytic render/searches render/surface_fractals render/hast_above render/lanes_measured
+kernels/*/march*: render/surface_analytic render/searches render/level_normals render/hast_above render/lanes_measured
 kernels/*/solids*: render/joined
 kernels/formulas/solid_inside.h: voxels/
 kernels/formulas/node_proof.h: voxels/
@@ -66,14 +66,14 @@ kernels/voxels/bricks.h: voxels/
 clfractal/geometry/solids.py: voxels/joined_voxels render/joined
 kernels/*/trap*: render/coloring render/joined
 kernels/*/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
-kernels/*/p[ar]*: render/surface_samples render/passes device/tune
-kernels/integrators/pixel.h: render/surface_samples render/passes render/surface_light
+kernels/*/p[ar]*: render/reconstruction render/tiles_bits device/tune
+kernels/integrators/pixel.h: render/reconstruction render/tiles_bits render/surface_light
 kernels/formulas/points.cl: render/points formulas/counts
 kernels/voxels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
 kernels/device/gather.h: render/volume_rays render/volume_surface
-kernels/*/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/volume_bits render/turned_grids
+kernels/*/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/turned_grids
 kernels/*/voxels*: voxels/ render/volume_surface render/turned_grids
-kernels/integrators/tiles.h: render/tiles_bits render/surface_samples
+kernels/integrators/tiles.h: render/tiles_bits render/reconstruction
 kernels/*: numbers/ render/surface_analytic render/surface_light
 clfractal/cli/*: cli bad_input exchange stereo_shell
 clfractal/api.py: api stereo_python engine/engine
@@ -83,14 +83,14 @@ clfractal/files/*: files/
 clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/catalog
 clfractal/camera/*: render/view render/stereo_views render/surface_analytic
 clfractal/images/*: render/framebuffer render/framebuffer_store render/compose render/anaglyph render/compose_files
-clfractal/integrators/*: render/job_data render/program_text render/points render/surface_light render/volume_surface
+clfractal/integrators/*: render/job_data render/few_programs render/points render/surface_light render/volume_surface
 clfractal/scene/grid_place.py: render/turned_grids
 clfractal/scene/given.py: render/turned_grids scene/volume_scenes
 clfractal/scene/palette.py: scene/ bad_input render/planes_in_picture
 clfractal/scene/*: scene/ bad_input
-clfractal/voxels/*: voxels/ render/volume_rays render/volume_bits
+clfractal/voxels/*: voxels/ render/volume_rays render/turned_grids
 clfractal/engine/var*: engine/variations vary_shell
-clfractal/engine/*: engine/ render/passes resume comfort
+clfractal/engine/*: engine/ render/tiles_bits resume comfort
 clfractal/viewer/panels/*: viewer/panels viewer/widgets viewer/formula_panels viewer/golden_panels
 clfractal/viewer/app.py: window/
 clfractal/viewer/workspace.py: window/
@@ -113,7 +113,7 @@ QUICK = (
     "tests/test_api.py",
     "tests/scene",
     "tests/render/test_framebuffer.py",
-    "tests/render/test_surface_samples.py",
+    "tests/render/test_reconstruction.py",
     "tests/render/test_stereo_pictures.py",
     "tests/render/test_volume_surface.py",
     "tests/test_scenes.py",

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 import subprocess
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,8 +16,12 @@ from clfractal.device.select import Device
 from clfractal.engine.job import Job
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
+from clfractal.errors import FileError
 from clfractal.images.framebuffer import Framebuffer
+from clfractal.images.store import JournalFramebuffer
+from clfractal.scene.model import Scene
 from tests.render.bits import same_pictures
 from tests.render.job_scenes import SCENES, lit_by_a_file, scene_of
 from tests.render.shots import engine_of
@@ -107,3 +114,111 @@ def test_a_job_takes_up_little_room(device: Device, tmp_path: Path) -> None:
     scene = scene_of(tmp_path, image={"width": 16384, "height": 16384})
     job = engine_of(device).prepare(scene)
     assert len(pickle.dumps(job)) < 50_000
+
+
+KEYS = {"scene", "environment", "grid", "version", "device", "driver", "lanes"}
+
+
+def identity(scene: Scene, device: Device, **settings: Any) -> dict[str, Any]:
+    return prepare(scene, device, **{"precision": "float32", **settings}).identity(0)
+
+
+def begin(path: Path, known_by: Mapping[str, Any], *, resume: bool) -> JournalFramebuffer:
+    return JournalFramebuffer(path, known_by, ("A",), (32, 32), resume=resume)
+
+
+def with_lanes(job: Job) -> dict[str, Any]:
+    """As if another lane count had been found the fastest meanwhile."""
+    view = job.views[0]
+    other = dataclasses.replace(view.plan, lanes=4 if view.plan.lanes != 4 else 8)
+    return dataclasses.replace(job, views=(dataclasses.replace(view, plan=other),)).identity(0)
+
+
+@pytest.mark.parametrize("name", ["environment", "volume", "layout for two eyes"])
+def test_work_is_resumed_only_if_all_of_it_is_equal(device: Device, tmp_path: Path, name: str) -> None:
+    """Each key in turn, and what a journal adds."""
+    known_by = identity(SCENES[name](tmp_path), device)
+    assert known_by.keys() == KEYS | ({"eye", "view"} if name == "layout for two eyes" else set())
+    path = tmp_path / "a.partial"
+    film = begin(path, known_by, resume=False)
+    film.put(0, np.ones((1, 32, 32), np.float32))
+    film.close()
+    kept = path.read_bytes()
+    for key, value in known_by.items():
+        other = {**value, "version": 2} if isinstance(value, dict) else f"another {value}"
+        for changed in ({**known_by, key: other}, {k: v for k, v in known_by.items() if k != key}):
+            with pytest.raises(FileError, match=f"cannot be resumed: the {key} "):
+                begin(path, changed, resume=True)
+            assert path.read_bytes() == kept
+    again = begin(path, known_by, resume=True)
+    assert again.done.all()
+    again.close()
+
+
+@pytest.mark.parametrize(("name", "file"), [("environment", "sky.exr"), ("volume", "ball.nrrd")])
+def test_a_file_that_the_scene_names_has_changed(
+    device: Device, tmp_path: Path, name: str, file: str
+) -> None:
+    """The scene is the same, letter by letter."""
+    before = identity(SCENES[name](tmp_path), device)
+    assert identity(SCENES[name](tmp_path), device) == before
+    changed = bytearray((tmp_path / file).read_bytes())
+    changed[-1] ^= 1
+    # A new file, because the old one may be mapped into memory.
+    (tmp_path / "new").write_bytes(changed)
+    (tmp_path / "new").replace(tmp_path / file)
+    job = prepare(_read_again(name, tmp_path), device, precision="float32")
+    after = job.identity(0)
+    key = "environment" if name == "environment" else "grid"
+    assert {k for k in KEYS if before[k] != after[k]} == {key}
+
+
+def _read_again(name: str, folder: Path) -> Scene:
+    if name == "environment":
+        return scene_of(
+            folder,
+            environment={"file": "sky.exr", "rays": 2},
+            renderer={"samples": 4, "noise": 0.05, "min_samples": 4},
+        )
+    fog = {"opacity": [{"at": 0.3, "opacity": 0}, {"at": 1, "opacity": 0.6}]}
+    return scene_of(folder, renderer={"type": "volume", "file": "ball.nrrd", "transfer": fog})
+
+
+def test_decisions_and_the_device(device: Device, tmp_path: Path) -> None:
+    """What the program decided counts like what the scene says."""
+    job = prepare(scene_of(tmp_path), device, precision="float32")
+    before = job.identity(0)
+    assert {k for k in KEYS if before[k] != with_lanes(job)[k]} == {"lanes"}
+    for samples in (1, 7):
+        found = identity(scene_of(tmp_path), device, samples=samples)
+        assert found["scene"]["renderer"]["samples"] == samples
+    driver = dataclasses.replace(job, device=dataclasses.replace(job.device, driver="99.9")).identity(0)
+    assert {k for k in KEYS if before[k] != driver[k]} == {"driver"}
+    name = dataclasses.replace(job, device=dataclasses.replace(job.device, name="Another")).identity(0)
+    assert {k for k in KEYS if before[k] != name[k]} == {"device", "driver"}
+
+
+@pytest.mark.parametrize(
+    "shown",
+    [
+        {"method": "gray"},
+        {"glasses": "amber_blue"},
+        {"mode": "rows"},
+        {"swap": True},
+        {"mode": "anaglyph_chessboard", "colors": [[1, 0, 0], [0, 1, 1]]},
+    ],
+    ids=str,
+)
+def test_the_way_to_show_a_pair_may_change(device: Device, tmp_path: Path, shown: dict[str, Any]) -> None:
+    pair = {"mode": "anaglyph", "separation": 0.3}
+    before = identity(scene_of(tmp_path, stereo=pair), device)
+    assert identity(scene_of(tmp_path, stereo={**pair, **shown}), device) == before
+    assert identity(scene_of(tmp_path, stereo={**pair, "separation": 0.4}), device) != before
+
+
+def test_bookmarks_and_how_files_are_written_may_change(device: Device, tmp_path: Path) -> None:
+    before = identity(scene_of(tmp_path), device)
+    assert identity(scene_of(tmp_path, output={"exposure": 2, "png_bits": 16}), device) == before
+    bookmarks = {"here": {"position": [0, -3, 0], "target": [0, 0, 0]}}
+    assert identity(scene_of(tmp_path, bookmarks=bookmarks), device) == before
+    assert identity(scene_of(tmp_path, material={"specular": 0.11}), device) != before
