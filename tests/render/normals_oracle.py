@@ -28,24 +28,9 @@ def grid_offsets(side: int) -> Floats:
     return np.array([(right, -below) for below in steps for right in steps])
 
 
-def perspective_points(offsets: Floats, pixel_width: float, depths: Floats) -> Floats:
-    """Points (..., count, 3) of rays from the eye; `pixel_width` at distance 1, depths (..., count) along each ray."""
-    rays = np.concatenate([offsets * pixel_width, -np.ones((len(offsets), 1))], axis=1)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    return np.asarray(rays * depths[..., None])
-
-
 def unit(vectors: Floats) -> Floats:
     """Vectors (..., 3) at length 1."""
     return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
-
-
-def gradient(rising: Floats, right: Floats, up: Floats) -> Floats:
-    """The exact normal (..., 3) from what rises fastest out of the solid (..., 3), given in the scene's space.
-
-    `right` and `up` (3) are the pixel's axes there, of length 1 and at a right angle.
-    """
-    return unit(rising @ np.array([right, up, np.cross(right, up)]).T)
 
 
 def least_squares(points: Floats) -> tuple[Floats, Floats]:

@@ -290,11 +290,6 @@ def test_traps_on_objects_beside_the_set(by: str) -> None:
 # -- what is told
 
 
-def test_a_scene_with_a_relief_is_written_and_read() -> None:
-    scene = relief(TRAP, width=0.02)
-    assert clfractal.load_scene(dump_scene(scene)) == scene
-
-
 def waves(folder: Path, count: int = 256) -> None:
     """A picture of one wave to the right, whose numbers are as they are."""
     row = 0.5 + 0.5 * np.sin(2 * np.pi * (np.arange(count) + 0.5) / count)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import tracemalloc
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -110,18 +110,26 @@ def test_a_region_is_the_same_part_of_the_whole(data: st.DataObject) -> None:
     planes = eyes(eye_size(scene, image))
     whole = in_memory(Composed(scene, image, *framebuffers(scene, image, None, planes)))
     part = Composed(scene, image, *framebuffers(scene, image, region, planes), region)
-    assert (part.display, part.region) == ((width, height), region)
-    row = region.y
-    for first, band in part.bands():
-        assert first == row
-        rows = len(band["R"])
-        assert tuple(band) == part.channels
-        for name, plane in band.items():
-            assert plane.dtype == np.float32
-            cut = whole[name][row : row + rows, region.x : region.right]
-            assert np.array_equal(plane, cut), name
-        row += rows
-    assert row == region.bottom
+    check_bands(part, whole, (width, height), region)
+
+
+def check_bands(
+    picture: Picture, whole: Mapping[str, np.ndarray], size: tuple[int, int], region: Region
+) -> None:
+    """They are the region's part of the whole, from top to bottom, however often they are read."""
+    assert (picture.display, picture.region) == (size, region)
+    for _ in range(2):
+        row = region.y
+        for first, band in picture.bands():
+            assert first == row
+            assert tuple(band) == picture.channels
+            rows = band["R"].shape[0]
+            assert 1 <= rows <= TILE
+            for name, plane in band.items():
+                assert plane.dtype == np.float32
+                np.testing.assert_array_equal(plane, whole[name][row : row + rows, region.x : region.right])
+            row += rows
+        assert row == region.bottom
 
 
 def test_eyes_that_a_region_does_not_need() -> None:
@@ -164,17 +172,6 @@ def test_an_anaglyph_has_colours_and_coverage_only() -> None:
             SceneError, match=rf"output\.channels: {mode} needs the channels R, G, B; G, B not among"
         ):
             composed_channels(stereo(mode), ("R", "Z"))
-
-
-def test_premultiplied_colours_stay_within_their_coverage() -> None:
-    left, right = eyes((30, 20))
-    for planes in (left, right):
-        for name in "RGB":
-            planes[name] *= planes["A"]
-    for method in ("color", "half_color", "gray"):
-        found = compose(stereo("anaglyph", method=method), left, right)
-        for name in "RGB":
-            assert (found[name] <= found["A"] * np.float32(1 + 1e-6)).all()
 
 
 def test_odd_numbers_go_through() -> None:
@@ -277,21 +274,9 @@ def by_numpy(places: list[Place], size: tuple[int, int]) -> Planes:
 
 
 def check(places: list[Place], size: tuple[int, int], region: Region) -> None:
-    """Its bands are the region's part of the whole, from top to bottom, however often they are read."""
-    picture, whole = pasted(places, size, region), by_numpy(places, size)
-    assert (picture.display, picture.region, picture.channels) == (size, region, FILLED)
-    for _ in range(2):
-        row = region.y
-        for first, band in picture.bands():
-            assert first == row
-            assert tuple(band) == FILLED
-            rows = band["R"].shape[0]
-            assert 1 <= rows <= TILE
-            for name, plane in band.items():
-                assert plane.dtype == np.float32
-                np.testing.assert_array_equal(plane, whole[name][row : row + rows, region.x : region.right])
-            row += rows
-        assert row == region.bottom
+    picture = pasted(places, size, region)
+    assert picture.channels == FILLED
+    check_bands(picture, by_numpy(places, size), size, region)
 
 
 @st.composite
@@ -310,34 +295,6 @@ def pastes(draw: st.DrawFn) -> tuple[list[Place], tuple[int, int], Region]:
 @given(pastes())
 def test_any_views_in_any_region(drawn: tuple[list[Place], tuple[int, int], Region]) -> None:
     check(*drawn)
-
-
-LAYOUTS = {
-    # The views of a row, with gaps; rows of views whose tiles do not lie on the picture's.
-    "row": ((91, 50), [Place(0, 0, 28, 50), Place(31, 0, 28, 50), Place(62, 0, 29, 50)]),
-    "grid": (
-        (80, 90),
-        [Place(0, 0, 39, 43), Place(41, 0, 39, 43), Place(0, 47, 39, 43), Place(41, 47, 39, 43)],
-    ),
-    "inset": ((91, 50), [Place(0, 0, 91, 50), Place(64, 2, 22, 26)]),
-    "covered": ((70, 70), [Place(10, 10, 20, 20), Place(0, 0, 70, 70)]),
-    "one over the other": (
-        (100, 100),
-        [Place(0, 33, 100, 40), Place(20, 1, 50, 97), Place(40, 40, 1, 1), Place(21, 64, 40, 36)],
-    ),
-    "nothing": ((33, 65), []),
-}
-
-
-@pytest.mark.parametrize(
-    "part", [(0, 0, 1, 1), (0.1, 0.3, 0.8, 0.6), (0.34, 0, 0.02, 1), (0.95, 0.9, 0.05, 0.1)]
-)
-@pytest.mark.parametrize("name", LAYOUTS)
-def test_layouts_and_regions(name: str, part: tuple[float, float, float, float]) -> None:
-    (width, height), places = LAYOUTS[name]
-    left, top = int(part[0] * width), int(part[1] * height)
-    region = Region(left, top, max(int(part[2] * width), 1), max(int(part[3] * height), 1))
-    check(places, (width, height), region)
 
 
 def test_headers_tell_what_all_views_do_and_the_time_of_all() -> None:

@@ -257,16 +257,20 @@ def test_a_sun_shines_through_rough_glass() -> None:
     assert seen(smooth, 4)[0].mean() < 0.01
 
 
-def test_scenes_without_glass_do_not_know_it() -> None:
-    """No program more: a material whose transmission has no weight is like one without transmission."""
-    scenes = [
-        scene_of(lighting=path(2), materials={"m": {"transmission": values}}, material={"name": "m"})
-        for values in ({}, {"color": [0.5, 0.6, 0.7], "depth": 2, "dispersion_scale": 1})
-    ]
+@pytest.mark.parametrize(
+    "part",
+    [
+        {"transmission": {"color": [0.5, 0.6, 0.7], "depth": 2, "dispersion_scale": 1}},
+        {"subsurface": {"color": [0.5, 0.6, 0.7], "radius": 2}},
+    ],
+    ids=repr,
+)
+def test_scenes_without_it_do_not_know_it(part: dict[str, Any]) -> None:
+    """No program more: a material whose transmission, or what is below its boundary, has no weight is like one without."""
     texts = []
-    for one in scenes:
+    for values in ({}, part):
+        one = scene_of(lighting=path(2), materials={"m": values}, material={"name": "m"})
         plan = make_plan(one, precision="float32", lanes=4, channels=("R", "G", "B"))
-        found = program_texts(one, plan)
-        assert [text.name for text in found] == ["rays", "begin", "interactions", "scatter", "gather"]
-        texts.append([text.flat.text for text in found])
+        texts.append({text.name: text.flat.text for text in program_texts(one, plan)})
+    assert list(texts[0]) == ["rays", "begin", "interactions", "scatter", "gather"]
     assert texts[0] == texts[1]

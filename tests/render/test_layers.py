@@ -19,7 +19,6 @@ from clfractal.files.channels import (
     CRYPTOMATTE_MATERIALS,
     CRYPTOMATTE_OBJECTS,
     ID_CHANNELS,
-    LIGHT_LAYERS,
     NORMAL,
     NUMBERED,
     RAY_CHANNELS,
@@ -31,7 +30,6 @@ from clfractal.integrators import path_state
 from clfractal.integrators.passes import kept_numbers
 from clfractal.integrators.state import state_numbers
 from clfractal.integrators.surface import program_texts
-from clfractal.scene.model import Scene
 from clfractal.shading.cryptomatte import bits_of, identifier, murmur3, ranked
 from tests.render.path_scenes import BLACK, path, scene_of
 from tests.render.shots import Floats, plan_of, shoot
@@ -193,6 +191,10 @@ def test_a_lamp_that_is_seen_is_emission_and_white() -> None:
         (("direct.R",), {}, "direct.R needs lighting: {mode: path}"),
         (("albedo.G",), {"renderer": {"type": "volume"}}, "albedo.G is known of surfaces only"),
         (("R", "noisy.R"), {}, "noisy.R is what was denoised; it needs output.denoise: true"),
+        (("CryptoObject",), {"renderer": {"type": "volume"}}, "CryptoObject00.R is known of surfaces only"),
+        (("CryptoObject00.R", "R"), {}, "CryptoObject is one thing: name CryptoObject, which brings all"),
+        (("CryptoObjekt",), {}, "unknown channel 'CryptoObjekt'; did you mean 'CryptoObject'?"),
+        (("albedo", "albedo.G"), {}, "channel 'albedo.G' is given twice"),
     ],
 )
 def test_channels_that_a_scene_cannot_have(
@@ -201,12 +203,6 @@ def test_channels_that_a_scene_cannot_have(
     with pytest.raises(SceneError, match=re.escape(message)) as caught:
         clfractal.render(scene_of(**sections), channels=names)
     assert caught.value.where.path == "channels"
-
-
-def test_light_layers_are_paths_alone() -> None:
-    assert set(LIGHT_LAYERS) < set(SURFACE_LAYERS)
-    scene: Scene = scene_of(lighting=path(1), output={"channels": ["R", "G", "B", "direct.R"]})
-    assert scene.output.channels[-1] == "direct.R"
 
 
 def test_every_number_of_a_pixel_is_kept_under_its_own_name(device: Device) -> None:
@@ -423,20 +419,6 @@ def test_pictures_without_them_keep_nothing_for_them(device: Device) -> None:
     )
     assert program_texts(scene, without) == program_texts(scene, with_them)
     assert state_numbers(scene, without) + path_state.CRYPTOMATTE.numbers == state_numbers(scene, with_them)
-
-
-@pytest.mark.parametrize(
-    ("sections", "channels", "message"),
-    [
-        ({"renderer": {"type": "volume"}}, ["CryptoObject"], "CryptoObject00.R is known of surfaces only"),
-        ({}, ["CryptoObject00.R", "R"], "CryptoObject is one thing: name CryptoObject, which brings all"),
-        ({}, ["CryptoObjekt"], "unknown channel 'CryptoObjekt'; did you mean 'CryptoObject'?"),
-        ({}, ["albedo", "albedo.G"], "channel 'albedo.G' is given twice"),
-    ],
-)
-def test_what_cannot_be_is_told(sections: dict[str, Any], channels: list[str], message: str) -> None:
-    with pytest.raises(SceneError, match=re.escape(message)):
-        clfractal.render(scene_of(**sections), channels=channels)
 
 
 def test_layers_in_scene_files() -> None:

@@ -148,17 +148,6 @@ class TestRegion:
         framebuffer.save(tmp_path / "gap.exr")
         assert clfractal.load_scene(tmp_path / "gap.exr").layout is not None
 
-    def test_of_views_that_cover_each_other(self, device: Device) -> None:
-        views = [{**VIEWS[0], "area": [0, 0, 1, 1]}, {**VIEWS[1], "area": [0.5, 0.25, 0.4, 0.5]}]
-        scene = scene_of(views, SIZE)
-        whole, _ = counted(device, scene)
-        # Within the inset, past it, and across its rim.
-        for x, y, width, height in ((75, 25, 30, 20), (2, 2, 30, 30), (60, 10, 50, 30)):
-            part, _ = counted(device, scene, region=(x, y, width, height))
-            for name in CHANNELS:
-                cut = whole[name][y : y + height, x : x + width]
-                np.testing.assert_array_equal(part[name], cut, name)
-
     def test_of_the_largest_picture(self, device: Device) -> None:
         """Memory and time are those of the region: its tiles at the rims of two views of 8192 x 16384 pixels."""
         scene = scene_of([{}, VIEWS[1]], (16384, 16384))

@@ -47,16 +47,16 @@ def sphere_points(angle: float, footprint: float, offsets: Floats) -> Floats:
     return np.stack([footprint * offsets[:, 0], y, height], axis=-1)[None]
 
 
-def assert_safe(normals: Floats, usable: Masks, precision: Precision) -> None:
+def assert_safe(normals: Floats, usable: Masks, slack: float) -> None:
     """Never NaN, length 1, towards the viewer; straight at the viewer where unusable."""
-    assert np.abs(np.linalg.norm(normals, axis=-1) - 1).max() <= 4 * epsilon(precision)
+    assert np.abs(np.linalg.norm(normals, axis=-1) - 1).max() <= slack
     assert (normals[..., 2] > 0).all()
     assert (normals[~usable] == VIEWER).all()
 
 
-def assert_all_safe(found: Normals, precision: Precision) -> None:
+def assert_all_safe(found: Normals, slack: float) -> None:
     for normals, usable in (*found.methods().values(), (found.eight, found.eight_usable)):
-        assert_safe(normals, usable, precision)
+        assert_safe(normals, usable, slack)
     assert np.isfinite(found.residual).all()
     assert (found.residual >= 0).all()
     assert (found.residual[~found.plane_usable] == 0).all()
@@ -120,7 +120,7 @@ def test_any_subset_of_a_plane() -> None:
         given = np.where(SUBSETS[..., None], points, nothing)
         for precision, lanes in variants():
             found = run(given, SUBSETS, precision, lanes)
-            assert_all_safe(found, precision)
+            assert_all_safe(found, 4 * epsilon(precision))
             assert (found.plane_usable == ~on_a_line).all()
             for got, usable in found.methods().values():
                 assert (usable == ~on_a_line).all()
@@ -138,7 +138,7 @@ def test_any_subset_of_a_rough_surface() -> None:
     eight = oracle.eight_triangles(missing)
     for precision, lanes in variants():
         found = run(missing, SUBSETS, precision, lanes)
-        assert_all_safe(found, precision)
+        assert_all_safe(found, 4 * epsilon(precision))
         for name, (got, usable) in found.methods().items():
             assert (usable == np.isfinite(expected[name]).all(axis=1)).all(), name
             assert np.abs(got - expected[name])[usable].max() <= 50 * epsilon(precision), name
@@ -180,7 +180,7 @@ def test_points_on_a_line(case: str) -> None:
     points = LINES[case][None] * 1e-4
     for precision, lanes in variants():
         found = run(points, all_found(points), precision, lanes)
-        assert_all_safe(found, precision)
+        assert_all_safe(found, 4 * epsilon(precision))
         for name, (_, usable) in found.methods().items():
             assert not usable.any(), name
         assert not found.eight_usable.any()
@@ -252,20 +252,6 @@ def test_a_column_that_is_upright_but_for_rounding() -> None:
                 assert (found.residual <= 8 * epsilon(precision) * size).all()
 
 
-def test_neighbours_do_not_matter() -> None:
-    """A pixel's normals are the same bits whatever the other lanes of its packet hold."""
-    random = np.random.default_rng(17)
-    points = random.normal(size=(64, 9, 3))
-    there = random.random((64, 9)) < 0.7
-    points[~there] = np.nan
-    for precision, lanes in variants():
-        base = run(points, there, precision, lanes)
-        for order in (random.permutation(64), random.permutation(64)):
-            moved = run(points[order], there[order], precision, lanes)
-            assert np.array_equal(bits_of(base)[order], bits_of(moved))
-            assert np.array_equal(base.residual[order], moved.residual)
-
-
 # What a search may hand over, far beyond what it should.
 NUMBERS = st.floats(-1e12, 1e12) | st.sampled_from([0.0, 1.0, -1.0, 1e-7, 1e-20, 1e-38, 1e12])
 
@@ -279,53 +265,4 @@ def test_any_points_are_safe(precision: Precision, points: list[tuple[float, flo
     """Whatever is found, wherever: no NaN, length 1, towards the viewer, and (0, 0, 1) where nothing can be told."""
     given = np.array([point[:3] for point in points])[None]
     there = np.array([point[3] for point in points])[None]
-    found = run(given, there, precision, lanes_of(precision))
-    assert np.isfinite(found.residual).all()
-    for normals, usable in (*found.methods().values(), (found.eight, found.eight_usable)):
-        assert np.abs(np.linalg.norm(normals, axis=-1) - 1).max() <= 1e-6
-        assert (normals[..., 2] > 0).all()
-        assert (normals[~usable] == [0, 0, 1]).all()
-
-
-def sphere_depths(offsets: Floats, pixel_width: float, distance: float) -> Floats:
-    """Where rays from the eye meet the unit sphere around (0, 0, -distance); NaN where they miss."""
-    rays = np.concatenate([offsets * pixel_width, -np.ones((len(offsets), 1))], axis=1)
-    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
-    toward = -distance * rays[:, 2]
-    under = 1 - distance**2 + toward**2
-    return np.asarray(toward - np.sqrt(np.where(under < 0, np.nan, under)))
-
-
-@pytest.mark.parametrize("rim", [0.0, 0.5, 0.9])
-def test_numpys_normals_of_a_sphere(rim: float) -> None:
-    """In perspective, at places up to near the rim: all five within the bend of the surface over a pixel."""
-    width, distance = 1e-3, 4.0
-    middle = np.array([rim * np.tan(np.arcsin(1 / distance)) / width, 0.0])
-    offsets = GRID + middle
-    points = oracle.perspective_points(offsets, width, sphere_depths(offsets, width, distance))
-    exact = oracle.gradient(points[4] + [0, 0, distance], np.array([1.0, 0, 0]), np.array([0, 1.0, 0]))
-    bend = width * distance / np.sqrt(1 - rim**2)
-    plane, residual = oracle.least_squares(points)
-    assert residual < width * distance * bend
-    shaded = oracle.eight_triangles_shading(points[None], lambda normals: normals)[0]
-    for normal in (
-        plane,
-        oracle.one_triangle(points[None])[0],
-        oracle.eight_triangles_normal(points[None])[0],
-        shaded,
-    ):
-        assert np.linalg.norm(normal - exact) < bend
-
-
-def test_numpys_normals_leave_out_what_is_missing() -> None:
-    plane = np.concatenate([GRID, GRID @ np.array([[2.0], [-1.0]])], axis=1)
-    normal = np.array([-2.0, 1.0, 1.0]) / np.sqrt(6)
-    for missing in ([0], [1, 6], [4], [0, 1, 2, 3]):
-        points = plane.copy()[None]
-        points[0, missing, 2] = np.nan
-        np.testing.assert_allclose(oracle.least_squares(points)[0][0], normal, atol=1e-14)
-        np.testing.assert_allclose(oracle.one_triangle(points)[0], normal, atol=1e-14)
-        np.testing.assert_allclose(oracle.eight_triangles_normal(points)[0], normal, atol=1e-14)
-        shaded = oracle.eight_triangles_shading(points, lambda normals: normals[..., :1])
-        np.testing.assert_allclose(shaded[0], normal[:1], atol=1e-14)
-    assert np.isnan(oracle.least_squares(plane[None, :3])[0]).all()
+    assert_all_safe(run(given, there, precision, lanes_of(precision)), 1e-6)

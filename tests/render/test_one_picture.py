@@ -92,13 +92,6 @@ def test_a_larger_picture_shows_the_same_more_finely(engine: Engine) -> None:
     assert apart(engine.render(alone, samples=4), engine.render(scene, samples=64)) > 0.03
 
 
-def test_a_region_is_a_part_of_the_same_picture(engine: Engine) -> None:
-    scene = scene_of("mandelbulb")
-    whole = engine.render(scene, size=(96, 54))
-    part = engine.render(scene, size=(96, 54), region=(40, 20, 24, 16))
-    assert np.array_equal(part["R"], whole["R"][20:36, 40:64])
-
-
 def test_the_level_is_measured_in_the_references_pixels() -> None:
     """In scene units the place of light is the same at any size; hits are found as exactly as the finer of both needs."""
     scene = scene_of()

@@ -212,13 +212,3 @@ def test_a_ball_is_that_of_a_random_walk() -> None:
     of_object = colors_of(scene(objects, {"m": material}, bounces=8), 256)[13:19, 13:19].mean(axis=(0, 1))
     np.testing.assert_allclose(of_set, expected, atol=0.006)
     np.testing.assert_allclose(of_object, expected, atol=0.01)
-
-
-def test_scenes_without_it_do_not_know_it() -> None:
-    texts = []
-    for values in ({}, {"color": [0.5, 0.6, 0.7], "radius": 2}):
-        found = scene_of(lighting=path(2), materials={"m": {"subsurface": values}}, material={"name": "m"})
-        plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
-        texts.append([text.flat.text for text in program_texts(found, plan)])
-    assert texts[0] == texts[1]
-    assert len(texts[0]) == 5

@@ -46,31 +46,24 @@ def test_two_lights_are_their_sum() -> None:
     assert np.abs(both - each[0] - each[1]).max() < 0.25
 
 
-def test_a_disc_of_light_has_its_closed_form() -> None:
-    """Wholly over the horizon a disc lights as its middle: intensity times the cosine."""
-    light = {"direction": [0, 1, -0.5], "angular_size": 20}
-    colors, normals, _ = seen(
-        scene_of(lights=[light], lighting=path(), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}),
-        64,
-    )
-    toward = np.array([0, -1, 0.5]) / math.hypot(1, 0.5)
-    cosine = normals @ toward
-    lit = cosine > math.sin(math.radians(12))
-    assert lit.sum() > 300
-    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.005
-
-
-def test_a_point_light_with_a_size_is_as_bright() -> None:
-    """Its directions spread about its place; no ray of a path can meet it, so all of it is asked for."""
-    lamp = {"type": "point", "position": [0, -3000, 1500], "angular_size": 20}
-    colors, normals, _ = seen(
-        scene_of(lights=[lamp], lighting=path(2), material={"color": [1, 1, 1], "specular": 0, "diffuse": 1}),
-        64,
-    )
+@pytest.mark.parametrize(
+    ("light", "rim", "error"),
+    [
+        ({"direction": [0, 1, -0.5]}, 12, 0.005),
+        ({"type": "point", "position": [0, -3000, 1500]}, 16, 0.01),
+    ],
+    ids=["directional", "point"],
+)
+def test_a_disc_of_light_has_its_closed_form(light: dict[str, Any], rim: float, error: float) -> None:
+    """Wholly over the horizon a disc lights as its middle: intensity times the cosine. No ray of a path can meet that of a
+    point light, whose directions spread about its place; so all of it is asked for."""
+    white = {"color": [1, 1, 1], "specular": 0, "diffuse": 1}
+    lights = [{**light, "angular_size": 20}]
+    colors, normals, _ = seen(scene_of(lights=lights, lighting=path(2), material=white), 64)
     cosine = normals @ (np.array([0, -1, 0.5]) / math.hypot(1, 0.5))
-    lit = cosine > math.sin(math.radians(16))
+    lit = cosine > math.sin(math.radians(rim))
     assert lit.sum() > 250
-    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < 0.01
+    assert abs((colors[lit, 0] / cosine[lit]).mean() - 1) < error
 
 
 def test_a_disc_is_found_by_mirrors() -> None:

@@ -322,16 +322,6 @@ def test_data_channels_take_the_nearest_sample(device: Device, samples: int) -> 
     assert np.isfinite(stacked(framebuffer, [name for name in CHANNELS if name != "Z"])).all()
 
 
-def test_seed_and_region_of_samples(device: Device) -> None:
-    """Another seed, other places; the same seed, the same picture, in a region too."""
-    scenes = [scene_of(QUICK_BALL, PERSPECTIVE, renderer={"seed": seed}) for seed in (0, 1)]
-    first, second = (stacked(shoot(scene, device, samples=4)) for scene in scenes)
-    assert not np.array_equal(first, second)
-    assert np.abs(first[..., 3] - second[..., 3]).mean() < 0.02
-    part = stacked(shoot(scenes[0], device, samples=4, region=(17, 5, 40, 33)))
-    assert np.array_equal(part, first[5:38, 17:57])
-
-
 HALF = 1.2  # of the box's side
 FILTERS = [("box", 1.0), ("box", 0.5), ("box", 3.0), ("tent", 2.0), ("tent", 5.0)]
 FILTERS += [("blackman_harris", 3.0), ("blackman_harris", 6.0)]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -42,6 +43,7 @@ from tests.render.shots import (
     view_of,
 )
 from tests.scenes import scene_of
+from tests.variants import combinations
 
 # In float32 coordinates near 1 and depths near 3 come in steps of 1e-7 and 2e-7; some operations add up.
 ROUNDING = 2e-6
@@ -196,18 +198,6 @@ def _box_distance(points: Floats) -> Floats:
     return np.asarray(np.linalg.norm(np.maximum(q, 0), axis=-1) + np.minimum(q.max(-1), 0))
 
 
-FORMULAS = {
-    "rule": {"name": "mandelbulb", "iterations": 8},
-    "jacobian": {"name": "hast", "iterations": 12},
-}
-MORE = {
-    "quaternion": {"name": "quaternion_julia", "iterations": 10},
-    "folds": {"name": "mandelbox", "iterations": 8},
-    "shape": {"name": "menger_sponge", "iterations": 4},
-    "ship": {"name": "burning_ship", "iterations": 9},
-}
-
-
 def seen_from(formula: dict[str, Any], far: float, bounds: float | None) -> Scene:
     """A formula from so far away, and with bounds that are so large, in radii of its ball; the picture shows the ball."""
     chain = scenes.scene_of(formula).chain
@@ -227,7 +217,23 @@ def seen_from(formula: dict[str, Any], far: float, bounds: float | None) -> Scen
     return scenes.scene_of(formula, camera, (160, 160), renderer=renderer, lights=[])
 
 
-def check(device: Device, formula: dict[str, Any]) -> None:
+@pytest.mark.parametrize(
+    "formula",
+    [
+        {"name": "mandelbulb", "iterations": 8},
+        {"name": "hast", "iterations": 12},
+        *combinations(
+            [
+                {"name": "quaternion_julia", "iterations": 10},
+                {"name": "mandelbox", "iterations": 8},
+                {"name": "menger_sponge", "iterations": 4},
+                {"name": "burning_ship", "iterations": 9},
+            ]
+        ),
+    ],
+    ids=itemgetter("name"),
+)
+def test_nothing_is_lost(device: Device, formula: dict[str, Any]) -> None:
     """No ray goes through three footprints of the set unseen, and as many surfaces are nearer as are farther away."""
     for far in (2.5, 40.0):
         usual = seen_from(formula, far, None)
@@ -243,17 +249,6 @@ def check(device: Device, formula: dict[str, Any]) -> None:
             off = (seen.t[both] - home.t[both]) / home.rays[both].width(home.t[both])
             assert np.median(np.abs(off)) < 0.3
             assert abs((off > 3).sum() - (off < -3).sum()) < 0.005 * both.sum()
-
-
-@pytest.mark.parametrize("name", FORMULAS)
-def test_nothing_is_lost(device: Device, name: str) -> None:
-    check(device, FORMULAS[name])
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("name", MORE)
-def test_nothing_of_others_is_lost(device: Device, name: str) -> None:
-    check(device, MORE[name])
 
 
 def test_what_is_farther_out_than_the_ball_is_seen(device: Device) -> None:

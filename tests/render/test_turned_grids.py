@@ -25,6 +25,7 @@ from tests.render.bits import same
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import (
     BALL,
+    CAMERAS,
     ORTHOGRAPHIC,
     PERSPECTIVE,
     Floats,
@@ -101,15 +102,10 @@ def check_ball(framebuffer: Any, scene: Scene, steps: Floats) -> None:
 
 
 @pytest.mark.parametrize("name", STEPS)
-@pytest.mark.parametrize("camera", [PERSPECTIVE, ORTHOGRAPHIC], ids=["perspective", "orthographic"])
-def test_a_surface(device: Device, folder: Path, name: str, camera: dict[str, Any]) -> None:
-    scene = volume_scene(camera, folder=folder, file=file_of(name), level=0.0)
-    check_ball(shoot(scene, device), scene, STEPS[name])
-
-
-@pytest.mark.parametrize("name", STEPS)
-def test_an_object(device: Device, folder: Path, name: str) -> None:
-    scene = object_scene(folder, file=file_of(name), level=0.0)
+@pytest.mark.parametrize("kind", ["perspective", "orthographic", "object"])
+def test_surfaces_and_objects(device: Device, folder: Path, name: str, kind: str) -> None:
+    shown: dict[str, Any] = {"folder": folder, "file": file_of(name), "level": 0.0}
+    scene = object_scene(**shown) if kind == "object" else volume_scene(CAMERAS[kind], **shown)
     check_ball(shoot(scene, device), scene, STEPS[name])
 
 
@@ -312,28 +308,19 @@ def test_a_zoom_shows_the_small_box_as_large_as_the_first(device: Device, scales
     light = {"lights": [{"direction": [-1, 1, -1]}], "formula": HAST}
     eye = np.array([1.2, -2.8, 1.6])
     common = {"type": "volume", "resolution": [48, 40, 32], "value": "coverage", "precision": "float32"}
-    zoomed = zoomed_scene(
-        **light,
-        renderer={**common, "box": first, "zoom": [{"center": list(small), "scale": s} for s in scales]},
+    zoom = {"box": first, "zoom": [{"center": list(small), "scale": s} for s in scales]}
+    itself = {"box": {"center": list(small), "size": [0.6, 0.5, 0.4]}}
+    near, far = (
+        shoot(
+            zoomed_scene(
+                camera={"position": list(target + away), "target": list(target), "fov": 45},
+                renderer={**common, **box},
+                **light,
+            ),
+            device,
+        )
+        for target, away, box in ((middle, eye, zoom), (small, eye / 4, itself))
     )
-    zoomed = zoomed.model_copy(
-        update={
-            "camera": zoomed.camera.model_copy(
-                update={"position": tuple(middle + eye), "target": tuple(middle)}
-            )
-        }
-    )
-    itself = zoomed_scene(
-        **light, renderer={**common, "box": {"center": list(small), "size": [0.6, 0.5, 0.4]}}
-    )
-    itself = itself.model_copy(
-        update={
-            "camera": itself.camera.model_copy(
-                update={"position": tuple(small + eye / 4), "target": tuple(small)}
-            )
-        }
-    )
-    near, far = shoot(zoomed, device), shoot(itself, device)
     hit = (near["A"] > 0) & (far["A"] > 0)
     assert hit.mean() > 0.1
     assert ((near["A"] > 0) != (far["A"] > 0)).mean() < 0.01
