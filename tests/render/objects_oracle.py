@@ -127,3 +127,8 @@ def _quadric(o: Floats, d: Floats, q: Floats) -> tuple[Floats, Floats]:
     root = np.sqrt(b * b - a * c)
     root = np.where(np.isnan(root), -np.inf, root)
     return (-b - root) / a, (-b + root) / a
+
+
+def light_of(mode: str) -> dict[str, Any]:
+    """Light that surfaces reflect once."""
+    return {"lighting": {"mode": mode, **({"bounces": 0} if mode == "path" else {})}}

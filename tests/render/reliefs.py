@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 import clfractal
 from clfractal.scene.model import Scene
+from tests.render.normals_oracle import unit
 from tests.render.path_scenes import GREY, path, scene_of
 
 Floats = npt.NDArray[np.float64]
@@ -46,10 +47,6 @@ def facts(scene: Scene, **options: Any) -> dict[str, Floats]:
     }
 
 
-def unit(a: Floats) -> Floats:
-    return np.asarray(a / np.linalg.norm(a, axis=-1, keepdims=True))
-
-
 def displaced(found: dict[str, Floats], gradient: Floats, eye: Floats = EYE) -> Floats:
     """Normals of the surface moved up by a height with that gradient in space, lowered where they turn from the viewer."""
     n = found["N"]
@@ -58,3 +55,16 @@ def displaced(found: dict[str, Floats], gradient: Floats, eye: Floats = EYE) -> 
     facing, turned = (n * toward).sum(axis=-1), (slope * toward).sum(axis=-1)
     lowered = np.where(turned > 0.9 * facing, 0.9 * facing / np.where(turned > 0, turned, 1), 1.0)
     return unit(n - lowered[:, None] * slope)
+
+
+def ramp(place: Floats, stops: list[list[float]]) -> Floats:
+    """Colours of a palette at places from 0 to 1."""
+    at = np.linspace(0, 1, len(stops))
+    return np.stack([np.interp(place, at, [stop[i] for stop in stops]) for i in range(3)], axis=-1)
+
+
+# A set of many colours.
+BULB: dict[str, Any] = {
+    "formula": {"name": "mandelbulb", "iterations": 7},
+    "camera": {"position": [1.3, -2.6, 0.5], "fov": 50},
+}

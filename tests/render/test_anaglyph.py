@@ -8,16 +8,10 @@ import numpy as np
 import pytest
 
 from clfractal.images.anaglyph import IDEAL, LUMINANCE, Glasses, Method, matrices, mix
-from tests.ghosting import REAL_RED_CYAN, ghosting, leaking
+from tests.ghosting import ghosting, leaking
 
 GLASSES: tuple[Glasses, ...] = ("red_cyan", "green_magenta", "amber_blue")
 METHODS: tuple[Method, ...] = ("color", "half_color", "gray", "dubois")
-
-
-def chart(*, dark: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-    """Two pictures of four pixels: every way in which dark and white can meet."""
-    left, right = np.array([[dark, dark, 1, 1], [dark, 1, dark, 1]], np.float32)[..., None]
-    return left * np.ones(3, np.float32), right * np.ones(3, np.float32)
 
 
 def mixer(method: Method, glasses: Glasses) -> Callable[[np.ndarray, np.ndarray], np.ndarray]:
@@ -113,24 +107,3 @@ def test_ghosting_by_hand() -> None:
     # Both eyes see all that is shown if there is no filter.
     bare = ((1.0, 1.0, 1.0), (1.0, 1.0, 1.0))
     assert ghosting(lambda left, right: left + right, white, white, "red_cyan", bare) == pytest.approx((1, 1))
-
-
-@pytest.mark.parametrize("glasses", GLASSES)
-def test_ghosts_through_ideal_filters(glasses: Glasses) -> None:
-    for method in METHODS[:3]:
-        assert ghosting(mixer(method, glasses), *chart(), glasses) == (0, 0)
-    shares = ghosting(mixer("dubois", glasses), *chart(), glasses)
-    # What it takes away for filters that leak, ideal ones show as a ghost.
-    assert min(shares) > 0
-    assert max(shares) < 0.1
-
-
-def test_least_squares_lessens_the_ghosts_of_real_glasses() -> None:
-    plain = ghosting(mixer("color", "red_cyan"), *chart(), "red_cyan", REAL_RED_CYAN)
-    least = ghosting(mixer("dubois", "red_cyan"), *chart(), "red_cyan", REAL_RED_CYAN)
-    # Nothing is darker than black: before black it can take nothing away. Before dark gray it can.
-    assert least[0] < plain[0]
-    before_gray = ghosting(mixer("dubois", "red_cyan"), *chart(dark=0.15), "red_cyan", REAL_RED_CYAN)
-    assert (
-        before_gray[0] < ghosting(mixer("color", "red_cyan"), *chart(dark=0.15), "red_cyan", REAL_RED_CYAN)[0]
-    )

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
-from tests.devices import device
+from tests.devices import check_usable, device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.planes import plane_scene
 from tests.render.point_checks import agree, orbit_bytes
@@ -78,8 +78,8 @@ def compare(name: str, chain: Chain) -> None:
 
 @pytest.mark.parametrize("name", CHAINS)
 def test_counts_and_distances_against_numpy(name: str) -> None:
-    if has_float64(device().info):
-        compare(name, chain_of(name))
+    check_usable("float64")
+    compare(name, chain_of(name))
 
 
 @pytest.mark.parametrize(
@@ -89,8 +89,7 @@ def test_counts_and_distances_against_numpy(name: str) -> None:
 def test_a_live_parameter_of_a_member_needs_no_other_program(
     name: str, member: int, parameters: dict[str, float]
 ) -> None:
-    if not has_float64(device().info):
-        return
+    check_usable("float64")
     members = [dict(each) for each in CHAINS[name]]
     members[member]["parameters"] = parameters
     moved = catalog.load_chain({"chain": members, "bailout": 12})

@@ -20,6 +20,7 @@ from clfractal.scene.model import Scene
 from clfractal.shading.kind_numbers import kind_text
 from tests.devices import device
 from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
+from tests.render.normals_oracle import unit
 from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
 from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
 from tests.scenes import BALL_ITERATIONS, scene_of
@@ -139,18 +140,14 @@ def ball(formula: Mapping[str, Any] = BALL, **coloring: Any) -> Scene:
 
 
 def units(count: int, seed: int = 1) -> Floats:
-    return normalized(np.random.default_rng(seed).normal(size=(count, 3)))
-
-
-def normalized(vectors: Floats) -> Floats:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
+    return unit(np.random.default_rng(seed).normal(size=(count, 3)))
 
 
 def views_onto(normals: Floats) -> Floats:
     """Directions that meet a surface with these normals from outside, none at a grazing angle."""
     views = units(len(normals), seed=2)
     views[(views * normals).sum(1) > 0] *= -1
-    return normalized(views - 0.5 * normals)
+    return unit(views - 0.5 * normals)
 
 
 def chord(points: Floats, ways: Floats, radius: float) -> tuple[Floats, Floats]:

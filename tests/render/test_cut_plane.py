@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.formulas import reference
 from clfractal.integrators.cut_plane import renderer_of
 from clfractal.integrators.plan import choose_precision
 from clfractal.scene.palette import named_table
 from clfractal.scene.rectangle import moved
+from tests.devices import check_usable
 from tests.render.planes import SMOOTH_RADIUS, Floats, mandelbrot, picture_of, pixel_points, plane_scene, sure
 from tests.render.shots import CHANNELS, shoot, stacked
 
@@ -48,8 +49,7 @@ class TestMandelbrot:
     def test_count_by_count(
         self, device: Device, precision: Precision, plane: dict[str, Any], iterations: int, least: float
     ) -> None:
-        if precision == "float64" and not has_float64(device.info):
-            return
+        check_usable(precision)
         size = (96, 96) if iterations < 1000 else (40, 40)
         scene = plane_scene(size=size, iterations=iterations, plane=plane, colors=STEPPED)
         framebuffer = shoot(scene, device, precision)

@@ -135,7 +135,7 @@ def mould(**sections: Any) -> Scene:
     return scene_of(block, camera, (160, 128), **{**usual, **sections})
 
 
-def ways(scene: Scene, t: Floats, direction: Floats, origin: Floats, width: Floats) -> npt.NDArray[np.bool_]:
+def ways(scene: Scene, t: Floats, direction: Floats, origin: Floats) -> npt.NDArray[np.bool_]:
     """Which places of rays belong to the set, at distances of shape (rays, places)."""
     return np.asarray(belongs(scene, origin[:, None] + t[..., None] * direction[:, None]))
 
@@ -151,10 +151,10 @@ def test_a_mould_of_a_fractal(device: Device) -> None:
     t = np.linalg.norm(points_of(framebuffer).reshape(-1, 3)[chosen] - o, axis=-1)
     width = footprint.reshape(-1)[chosen] * t
     around = t[:, None] + width[:, None] * np.linspace(-0.1, 1, 45)
-    assert ways(scene, around, d, o, width).any(axis=1).mean() > 0.99
+    assert ways(scene, around, d, o).any(axis=1).mean() > 0.99
     # Of the way before the hit, places a third of a footprint apart.
     before = t[:, None] - width[:, None] * np.arange(1.5, 90, 1 / 3)
-    within = ways(scene, before, d, o, width)
+    within = ways(scene, before, d, o)
     thick = np.logical_and.reduce([within[:, i : within.shape[1] - 9 + i] for i in range(9)])
     assert thick.any(axis=1).sum() == 0
     walls = np.linalg.norm(points_of(framebuffer).reshape(-1, 3)[chosen] - [0, -1, 0.5], axis=-1) < 1.15

@@ -88,23 +88,6 @@ def test_a_formula_at_another_place(device: Device, camera: dict[str, Any], poin
     agree(device, scene, placed(solids), degrees=6.0 if points > 1 else 1.0)
 
 
-def test_a_smooth_union_is_where_its_smooth_minimum_is_0(device: Device) -> None:
-    formula = {"inline": SOLIDS, "iterations": 3}
-    drop = {"type": "sphere", "position": [0.9, -0.7, 0.4], "radius": 0.35, "join": "smooth_union"}
-    camera = {**PERSPECTIVE, "target": [0.9, -0.7, 0.3], "fov": 24}
-    scene = scene_of(formula, camera, (112, 96), objects={"drop": {**drop, "smoothness": 0.4}})
-    exact = a_sphere([0.9, -0.7, 0.4], 0.35)
-
-    def flowing(points: Floats) -> Floats:
-        return smooth(np.maximum(solids(points), 0), exact(points), 0.4)
-
-    front = agree(device, scene, flowing, degrees=6)
-    origin, direction, _ = rays(scene)
-    plain = marched(lambda points: np.minimum(solids(points), exact(points)), origin, direction)
-    sooner = plain - np.where(front, marched(flowing, origin, direction), 0)
-    assert (sooner[front] > 0.02).sum() > 100, "something flows between both"
-
-
 @pytest.mark.parametrize("formula", [BALL, QUICK_BALL], ids=["jacobian", "rule"])
 def test_nothing_flows_to_the_ball_that_is_searched(device: Device, formula: dict[str, Any]) -> None:
     """A drop that is near to the formula's bounds, but not to its set, stays a drop."""
@@ -254,51 +237,55 @@ def share_of_drop(points: Floats) -> Floats:
     return np.asarray(np.where(b < a, 1 - others, others))
 
 
-def check(framebuffer: Any, scene: Scene, shown: Floats) -> None:
-    """The picture has the blended colours, and some that are neither's."""
+def flown(points: Floats) -> Floats:
+    """The distance to what has flowed together."""
+    return smooth(np.maximum(solids(points), 0), a_sphere(PLACE, RADIUS)(points), WIDTH)
+
+
+def test_a_smooth_union_is_where_its_smooth_minimum_is_0(device: Device) -> None:
+    scene = flowing({})
+    front = agree(device, scene, flown, degrees=6)
     origin, direction, _ = rays(scene)
+    exact = a_sphere(PLACE, RADIUS)
+    plain = marched(lambda points: np.minimum(solids(points), exact(points)), origin, direction)
+    sooner = plain - np.where(front, marched(flown, origin, direction), 0)
+    assert (sooner[front] > 0.02).sum() > 100, "something flows between both"
 
-    def distance(points: Floats) -> Floats:
-        return smooth(np.maximum(solids(points), 0), a_sphere(PLACE, RADIUS)(points), WIDTH)
 
-    met = np.isfinite(marched(distance, origin, direction)) & (framebuffer["A"] == 1)
+# What shows colours alone: ambient light (a lamp is behind), and materials that shine.
+SHOWN: dict[str, dict[str, Any]] = {
+    "direct": {
+        "materials": {"drop": {"base": {"color": DROP.tolist()}, "specular": {"weight": 0}}},
+        "material": {"color": OWN.tolist(), **LIT},
+        "lights": [{"type": "directional", "direction": [1.5, -2.5, 1.2]}],
+    },
+    "path": {
+        "materials": {
+            "own": {**DULL, "emission": {"luminance": 1, "color": OWN.tolist()}},
+            "drop": {**DULL, "emission": {"luminance": 2, "color": (DROP / 2).tolist()}},
+        },
+        "material": {"name": "own"},
+        "lights": [],
+        "background": [0, 0, 0],
+        "lighting": {"mode": "path", "bounces": 0},
+    },
+}
+
+
+@pytest.mark.parametrize("mode", SHOWN)
+def test_colours_are_blended(device: Device, mode: str) -> None:
+    """The picture has the blended colours, and some that are neither's."""
+    scene = flowing({"material": "drop"}, **SHOWN[mode])
+    framebuffer = shoot(scene, device)
+    origin, direction, _ = rays(scene)
+    met = np.isfinite(marched(flown, origin, direction)) & (framebuffer["A"] == 1)
     share = share_of_drop(points_of(framebuffer))[met][:, None]
     assert ((share > 0.2) & (share < 0.8)).sum() > 200
-    off = np.abs(shown[met] - (OWN + share * (DROP - OWN))).max(axis=-1)
+    off = np.abs(colors(framebuffer)[met] - (OWN + share * (DROP - OWN))).max(axis=-1)
     # Colours are those of the place where light is computed, some footprints before the surface.
     assert np.median(off) < 5e-3
     assert np.percentile(off, 90) < 0.06, np.percentile(off, [50, 90, 95, 99])
     assert np.percentile(off, 97) < 0.15
-
-
-def test_colours_are_blended(device: Device) -> None:
-    materials = {"drop": {"base": {"color": DROP.tolist()}, "specular": {"weight": 0}}}
-    scene = flowing(
-        {"material": "drop"},
-        materials=materials,
-        material={"color": OWN.tolist(), **LIT},
-        # From behind: ambient light alone.
-        lights=[{"type": "directional", "direction": [1.5, -2.5, 1.2]}],
-    )
-    framebuffer = shoot(scene, device)
-    check(framebuffer, scene, colors(framebuffer))
-
-
-def test_materials_are_blended_along_paths(device: Device) -> None:
-    materials = {
-        "own": {**DULL, "emission": {"luminance": 1, "color": OWN.tolist()}},
-        "drop": {**DULL, "emission": {"luminance": 2, "color": (DROP / 2).tolist()}},
-    }
-    scene = flowing(
-        {"material": "drop"},
-        materials=materials,
-        material={"name": "own"},
-        lights=[],
-        background=[0, 0, 0],
-        lighting={"mode": "path", "bounces": 0},
-    )
-    framebuffer = shoot(scene, device)
-    check(framebuffer, scene, colors(framebuffer))
 
 
 @pytest.mark.parametrize("by", one_of("iterations", "trap"))

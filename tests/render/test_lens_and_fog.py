@@ -78,7 +78,7 @@ def pinhole(scene: Scene, fine: int = 16) -> Floats:
 
 @pytest.fixture(scope="module", autouse=True)
 def _compiled(device: Device) -> None:
-    fog = fog_scene(PERSPECTIVE, 1.0, background=SKY, covered=True)
+    fog = fog_scene({"density": 1.0})
     compile_all([lens_scene(None), lens_scene(1.0), fog], device)
 
 
@@ -122,11 +122,14 @@ def test_focus_is_as_sharp_as_a_pinhole(device: Device) -> None:
     np.testing.assert_array_equal(shoot(same, device, channels=("A",))["A"], pictures[1])
 
 
-RED, MIST = np.array([0.9, 0.2, 0.1]), np.array([0.1, 0.3, 0.8])
+RED, MIST, GREEN = np.array([0.9, 0.2, 0.1]), np.array([0.1, 0.3, 0.8]), np.array([0.1, 0.6, 0.1])
 
 
 def fog_scene(
-    camera: dict[str, Any], density: float, *, background: Any, covered: bool, samples: int = 1
+    fog: dict[str, Any],
+    camera: dict[str, Any] = PERSPECTIVE,
+    background: Any = None,
+    precision: str = "float32",
 ) -> Scene:
     return scene_of(
         QUICK_BALL,
@@ -134,9 +137,9 @@ def fog_scene(
         (SIDE, SIDE),
         lights=[{"shadow": False}],
         material={"color": RED.tolist(), "ambient": 1, "diffuse": 0, "specular": 0},
-        background=background,
-        fog={"color": MIST.tolist(), "density": density, "background": covered},
-        renderer={"detail": 0.01, "samples": samples},
+        background=background or {"top": GREEN.tolist(), "bottom": GREEN.tolist()},
+        fog={"color": MIST.tolist(), **fog},
+        renderer={"detail": 0.01, "precision": precision},
     )
 
 
@@ -152,8 +155,8 @@ def test_fog(
 ) -> None:
     """exp(-density d) of the surface's colour comes through, d along the ray; behind the ball mist alone, or the sky, or
     nothing. No density is no fog."""
-    background = "transparent" if transparent else SKY
-    scene = fog_scene(camera, density, background=background, covered=covered)
+    fog = {"density": density, "background": covered}
+    scene = fog_scene(fog, camera, "transparent" if transparent else SKY)
     framebuffer = shoot(scene, device)
     seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
@@ -169,23 +172,6 @@ def test_fog(
     misty = covered and density > 0
     behind = np.zeros_like(seen) if transparent else np.broadcast_to(MIST, seen.shape) if misty else sky
     np.testing.assert_allclose(seen[miss], behind[miss], atol=1e-6)
-
-
-FOG_SIDE = 48
-GROUND, HAZE, GREEN = np.array([0.8, 0.1, 0.1]), np.array([0.3, 0.4, 0.6]), np.array([0.1, 0.6, 0.1])
-
-
-def scene_with(precision: str = "float32", **fog: Any) -> Scene:
-    return scene_of(
-        QUICK_BALL,
-        PERSPECTIVE,
-        (FOG_SIDE, FOG_SIDE),
-        lights=[{"shadow": False}],
-        material={"color": GROUND.tolist(), "ambient": 1, "diffuse": 0, "specular": 0},
-        background={"top": GREEN.tolist(), "bottom": GREEN.tolist()},
-        fog={"color": HAZE.tolist(), **fog},
-        renderer={"detail": 0.01, "precision": precision},
-    )
 
 
 def depth(origin: Floats, way: Floats, distance: Floats, fog: Any, parts: int = 4000) -> Floats:
@@ -209,7 +195,7 @@ CASES: list[dict[str, Any]] = [
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("values", CASES)
 def test_what_comes_through_is_the_integral(device: Device, values: dict[str, Any], precision: str) -> None:
-    scene = scene_with(precision, **values)
+    scene = fog_scene(values, precision=precision)
     framebuffer = shoot(scene, device)
     seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
@@ -218,13 +204,13 @@ def test_what_comes_through_is_the_integral(device: Device, values: dict[str, An
     inner = (framebuffer["A"] == 1) & (nearest < 0.98 * BALL_RADIUS)
     assert inner.sum() > 300
     through = np.exp(-depth(origin[inner], way[inner], distance[inner], scene.fog))[:, None]
-    np.testing.assert_allclose(seen[inner], GROUND * through + HAZE * (1 - through), atol=0.002)
+    np.testing.assert_allclose(seen[inner], RED * through + MIST * (1 - through), atol=0.002)
 
 
 @pytest.mark.parametrize("values", CASES)
 def test_the_sky_comes_through_above(device: Device, values: dict[str, Any]) -> None:
     """As far as one sees up; down there is no end of it."""
-    scene = scene_with(**values)
+    scene = fog_scene(values)
     framebuffer = shoot(scene, device)
     seen = stacked(framebuffer, ("R", "G", "B")).astype(float)
     origin, way, _ = rays(scene)
@@ -232,14 +218,17 @@ def test_the_sky_comes_through_above(device: Device, values: dict[str, Any]) -> 
     fog: Any = scene.fog
     rise = way @ (np.array(fog.up) / np.linalg.norm(fog.up))
     up, down = (framebuffer["A"] == 0) & (rise > 0.02), (framebuffer["A"] == 0) & (rise <= 0)
-    np.testing.assert_allclose(seen[down], np.broadcast_to(HAZE, seen[down].shape), atol=1e-5)
+    np.testing.assert_allclose(seen[down], np.broadcast_to(MIST, seen[down].shape), atol=1e-5)
     # Far enough that nothing of the fog is left.
     far = 40 * fog.height / rise[up]
     through = np.exp(-depth(origin[up], way[up], far, fog, parts=40_000))[:, None]
-    np.testing.assert_allclose(seen[up], GREEN * through + HAZE * (1 - through), atol=0.003)
+    np.testing.assert_allclose(seen[up], GREEN * through + MIST * (1 - through), atol=0.003)
 
 
 def test_without_a_height_nothing_has_changed(device: Device) -> None:
     """The greatest height is hardly one."""
-    flat, high = shoot(scene_with(density=0.4), device), shoot(scene_with(density=0.4, height=1e6), device)
+    flat, high = (
+        shoot(fog_scene({"density": 0.4}), device),
+        shoot(fog_scene({"density": 0.4, "height": 1e6}), device),
+    )
     np.testing.assert_allclose(flat["R"][flat["A"] == 1], high["R"][flat["A"] == 1], atol=1e-5)

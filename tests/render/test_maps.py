@@ -20,8 +20,8 @@ from clfractal.scene.model import Scene
 from clfractal.shading.maps import level_sizes, levels_of
 from tests.devices import check_usable
 from tests.render import reliefs
-from tests.render.color_maps import BULB, Floats, ramp
 from tests.render.path_scenes import GREY, path, scene_of, seen
+from tests.render.reliefs import BULB, Floats, ramp
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light

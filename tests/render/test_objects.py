@@ -11,7 +11,7 @@ from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
-from tests.render.objects_oracle import NOWHERE, met
+from tests.render.objects_oracle import NOWHERE, light_of, met
 from tests.render.shots import (
     BALL,
     BALL_RADIUS,
@@ -237,11 +237,6 @@ WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
 DULL = {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]}
 FLOOR = {"type": "plane", "position": [0, 0, -1], "material": "white"}
 BULB = {"name": "mandelbulb", "iterations": 6}
-
-
-def light_of(mode: str) -> dict[str, Any]:
-    """Light that surfaces reflect once."""
-    return {"lighting": {"mode": mode, **({"bounces": 0} if mode == "path" else {})}}
 
 
 def ball_object(formula: dict[str, Any], **values: Any) -> dict[str, Any]:

@@ -10,16 +10,15 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from tests.render.known_lights import CASES
-from tests.render.objects_oracle import NOWHERE, met
-from tests.render.shots import BALL, ORTHOGRAPHIC, PERSPECTIVE, colors, normals_of, points_of, rays, shoot
+from tests.render.objects_oracle import NOWHERE, light_of, met
+from tests.render.shots import BALL, PERSPECTIVE, colors, normals_of, points_of, rays, shoot
 from tests.scenes import scene_of
 from tests.variants import one_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
 FLOOR = {"type": "plane", "position": [0, 0, -0.5], "material": "white"}
 BALL_OBJECT = {"type": "sphere", "position": [0.2, -0.1, 0.3], "radius": 0.4, "material": "white"}
-DULL = {"ambient": 0, "diffuse": 1, "specular": 0}
+DULL = {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]}
 FROM_ABOVE = {**PERSPECTIVE, "position": [1.0, -1.8, 2.0]}
 
 
@@ -35,8 +34,8 @@ def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | Non
         materials={"white": WHITE},
         material=DULL,
         lights=[{"direction": way.tolist()}],
-        lighting={"mode": mode, **({"bounces": 0} if mode == "path" else {})},
         background=[0, 0, 0],
+        **light_of(mode),
     )
     shots: dict[str, Any] = {"lanes": lanes} if lanes else {}
     framebuffer = shoot(scene, device, **shots)
@@ -62,9 +61,9 @@ def test_set_and_objects_shadow_each_other(device: Device, mode: str) -> None:
     """A ball of the formula over a plane shadows as a ball among the objects does, and the other way round."""
     common: dict[str, Any] = {
         "materials": {"white": WHITE},
-        "material": {**DULL, "color": [1, 1, 1]},
+        "material": DULL,
         "lights": [{"direction": [0.4, 0.2, -1]}],
-        "lighting": {"mode": mode, **({"bounces": 0} if mode == "path" else {})},
+        **light_of(mode),
         "background": [0, 0, 0],
         "coloring": {"by": "solid"},
         "renderer": {"detail": 0.05},
@@ -115,30 +114,6 @@ def test_the_set_shadows_what_points_of_pixels_see_beside_it(device: Device, sea
     assert (expected[sure] == 0).sum() > 90
     assert (expected[sure] > 0).sum() > 800
     np.testing.assert_allclose(colors(framebuffer)[sure][:, 0], expected[sure], atol=1e-4)
-
-
-@pytest.mark.parametrize(("light", "expected"), CASES, ids=["sphere", "rectangle", "spot"])
-@pytest.mark.parametrize("mode", ["direct", "path"])
-def test_a_plane_has_the_irradiance_of_closed_forms(
-    device: Device, light: dict[str, Any], expected: Any, mode: str
-) -> None:
-    visible = {} if light["type"] == "spot" else {"visible": False}
-    scene = scene_of(
-        NOWHERE,
-        {**ORTHOGRAPHIC, "position": [0.4, -2, 1.6]},
-        (48, 48),
-        objects={"floor": {**FLOOR, "position": [0, 0, 0]}},
-        materials={"white": WHITE},
-        lights=[{**light, **visible}],
-        material=DULL,
-        lighting={"mode": mode, **({"bounces": 0} if mode == "path" else {})},
-        renderer={"samples": 16 if mode == "direct" else 64},
-        background=[0, 0, 0],
-    )
-    framebuffer = shoot(scene, device)
-    found, right = colors(framebuffer)[..., 0], expected(points_of(framebuffer))
-    assert (framebuffer["A"] == 1).all()
-    assert found.mean() == pytest.approx(right.mean(), rel=0.01)
 
 
 def test_a_mirror_shows_what_the_mirrored_ray_meets(device: Device) -> None:
@@ -245,12 +220,7 @@ def test_ambient_occlusion_is_not_used_along_paths(device: Device) -> None:
     np.testing.assert_array_equal(found[0], found[1])
 
 
-DULL_WHITE = {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]}
 HEIGHT, RADIUS, RADIANCE = 0.02, 0.015, 30.0
-
-
-def light_of(mode: str) -> dict[str, Any]:
-    return {"lighting": {"mode": mode, **({"bounces": 0} if mode == "path" else {})}}
 
 
 @pytest.mark.parametrize(
@@ -279,7 +249,7 @@ def test_a_lamp_just_above_a_plane(device: Device, mode: str, detail: float, lan
         (size, size),
         objects={"floor": floor},
         materials={"white": WHITE},
-        material=DULL_WHITE,
+        material=DULL,
         lights=[lamp],
         renderer={"samples": 256, "detail": detail, "firefly_limit": None},
         background=[0, 0, 0],
@@ -342,7 +312,7 @@ def test_no_object_is_in_its_own_shadow(
             (48, 48),
             objects={"body": {**OBJECTS[kind], "position": list(middle), "material": "white"}},
             materials={"white": WHITE},
-            material=DULL_WHITE,
+            material=DULL,
             lights=[{"direction": list(way)}],
             background=[0, 0, 0],
             **light_of(mode),

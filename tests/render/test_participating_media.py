@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 import pytest
 
 import clfractal
@@ -12,9 +13,22 @@ from clfractal.integrators.plan import make_plan
 from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.glass_scenes import BODIES, colors_of, glass, scene
-from tests.render.half_space import depth_function
 from tests.render.path_scenes import BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
+
+Floats = npt.NDArray[np.float64]
+
+
+def depth_function(albedo: float, cosines: Floats) -> Floats:
+    """Chandrasekhar's H for isotropic scattering (Radiative Transfer, 1950, chapter V), at given cosines."""
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    x, w = (nodes + 1) / 2, weights / 2
+    h = np.ones_like(x)
+    for _ in range(400):
+        h = 1 / (np.sqrt(1 - albedo) + albedo / 2 * (w * x * h / (x[:, None] + x)).sum(axis=1))
+    sums = (w * x * h / (cosines[..., None] + x)).sum(axis=-1)
+    return np.asarray(1 / (np.sqrt(1 - albedo) + albedo / 2 * sums))
+
 
 pytestmark = pytest.mark.light
 
@@ -145,8 +159,6 @@ def set_of(material: dict[str, Any], bounces: int = 8, **sections: Any) -> Scene
 
 def test_inversion_is_that_of_thick_bodies() -> None:
     """Albedos by the formula that kernels have, beside Chandrasekhar's half spaces that scatter all around (1950, V)."""
-    from tests.render.half_space import depth_function
-
     nodes, weights = np.polynomial.legendre.leggauss(64)
     cosines = (nodes + 1) / 2
     for color in np.linspace(0.02, 0.98, 13):

@@ -9,14 +9,12 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import Device
-from clfractal.scene.load import load_scene
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
 from tests.render.shots import (
     BALL_RADIUS,
     CAMERAS,
-    ORTHOGRAPHIC,
-    PERSPECTIVE,
     Floats,
     points_of,
     rays,
@@ -95,6 +93,20 @@ def expected(scene: Scene, values: Any) -> tuple[Floats, Floats, Any, Floats]:
     return color + through[..., None] * BACKGROUND, 1 - through, sure, half
 
 
+def check(device: Device, scene: Scene, values: Any) -> tuple[Framebuffer, Floats, Any, Floats]:
+    """Gives the picture, its coverage, where that is certain, and where half of the light is stopped."""
+    framebuffer = shoot(scene, device)
+    color, coverage, sure, half = expected(scene, values)
+    assert sure.mean() > 0.8
+    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
+    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
+    return framebuffer, coverage, sure, half
+
+
+# Of planes at one distance.
+PLACE = ([0.1, 0.1, 0.05], [0.1, -1, 0.2])
+
+
 @pytest.mark.parametrize("camera", CAMERAS)
 @pytest.mark.parametrize("cut", [False, True])
 def test_quads_in_fog(device: Device, tmp_path: Path, camera: str, cut: bool) -> None:
@@ -104,11 +116,7 @@ def test_quads_in_fog(device: Device, tmp_path: Path, camera: str, cut: bool) ->
         plane([0, 0.6, -0.1], [0.1, -1, 0.2], 0.6),
     ]
     scene, values = fog_scene(tmp_path, CAMERAS[camera], planes)
-    framebuffer = shoot(scene, device)
-    color, coverage, sure, half = expected(scene, values)
-    assert sure.mean() > 0.8
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
+    framebuffer, coverage, sure, half = check(device, scene, values)
     # Where half of the light is stopped, by fog, a quad or a face.
     origin, direction, _ = rays(scene)
     found = np.isfinite(framebuffer["Z"])
@@ -123,23 +131,17 @@ def test_quads_in_fog(device: Device, tmp_path: Path, camera: str, cut: bool) ->
         assert (np.abs(stacked(framebuffer, "RGB") - np.array(COLORS["inside"])).max(-1) < 1e-4).sum() > 150
 
 
-def test_quads_at_one_distance_in_fog(device: Device, tmp_path: Path) -> None:
-    """All of them are seen, the list's first in front, and the set on one is a hole in it."""
-    place = ([0.1, 0.1, 0.05], [0.1, -1, 0.2])
-    scene, values = fog_scene(
-        tmp_path, PERSPECTIVE, [plane(*place, 0.5, inside_opacity=0.0), plane(*place, 0.6)]
-    )
-    framebuffer = shoot(scene, device)
-    color, coverage, sure, _ = expected(scene, values)
-    assert sure.mean() > 0.8
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
-
-
-def test_faint_fog_before_an_opaque_quad(device: Device, tmp_path: Path) -> None:
-    """Fog that stops less than half of the light is seen before a quad all the same."""
-    scene, values = fog_scene(tmp_path, ORTHOGRAPHIC, [plane([0, 0.2, 0], [0, -1, 0], 1.0)] * 2)
-    framebuffer = shoot(load_scene(scene.resolved(), folder=tmp_path), device)
-    color, coverage, sure, _ = expected(scene, values)
-    np.testing.assert_allclose(stacked(framebuffer, "RGB")[sure], color[sure], atol=1e-3)
-    np.testing.assert_allclose(framebuffer["A"][sure], coverage[sure], atol=3e-4)
+@pytest.mark.parametrize(
+    ("camera", "planes"),
+    [
+        ("perspective", [plane(*PLACE, 0.5, inside_opacity=0.0), plane(*PLACE, 0.6)]),
+        ("orthographic", [plane([0, 0.2, 0], [0, -1, 0], 1.0)] * 2),
+    ],
+    ids=["hole", "opaque"],
+)
+def test_quads_at_one_distance_in_fog(
+    device: Device, tmp_path: Path, camera: str, planes: list[dict[str, Any]]
+) -> None:
+    """All of them are seen, the list's first in front, and the set on one is a hole in it; fog that stops less than half of
+    the light is seen before an opaque one all the same."""
+    check(device, *fog_scene(tmp_path, CAMERAS[camera], planes))

@@ -13,11 +13,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.formulas import reference
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.plan import choose_precision
 from clfractal.scene.model import Scene
+from tests.devices import check_usable
 from tests.render.planes import mandelbrot, sure
 from tests.render.quads import BACKGROUND, COLORS, LOOK, TINT, alpha_of, escape_tint, met, plane
 from tests.render.shots import (
@@ -236,8 +237,7 @@ def test_planes_without_opacity_are_not_seen(device: Device, renderer: str) -> N
 def test_a_plane_in_a_deep_zoom(device: Device) -> None:
     """400 million times magnified, hast in the plane z = 0 is the Mandelbrot set, count by count, whether the plane cuts or
     not. None of its few voxels is inside: only the plane is seen."""
-    if not has_float64(device.info):
-        return
+    check_usable("float64")
     x, y = -0.743643887037151, 0.131825904205330
     scenes = [
         scene_of(

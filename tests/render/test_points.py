@@ -16,7 +16,7 @@ from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.integrators import points
-from tests.devices import device, usable
+from tests.devices import check_usable, device
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
 from tests.render.point_checks import Floats, agree, orbit_bytes
@@ -58,8 +58,7 @@ def count_program(precision: Precision, lanes: int) -> SmallKernels:
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("case", sorted(CASES))
 def test_every_count_of_the_tables_at_every_lane_count(case: str, precision: Precision) -> None:
-    if not usable(precision):
-        return
+    check_usable(precision)
     rows, setting, chain = table(case), CASES[case], chain_of(case)
     constants = np.array(write_formula(chain).constants, precision)
     orbit = orbit_bytes(chain, int(setting["iterations"]), precision, setting["bailout"])
@@ -150,8 +149,7 @@ def points_of(chain: Chain) -> Floats:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_distances_and_normals(name: str) -> None:
-    if not usable("float64"):
-        return
+    check_usable("float64")
     chain = catalog.load_chain(name)
     formula, here = write_formula(chain), points_of(chain)
     orbit = orbit_bytes(chain, ITERATIONS, "float64", None)

@@ -14,11 +14,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.formulas.catalog import names
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.model import Scene
+from tests.devices import check_usable
 from tests.render.programs import compile_all
 from tests.render.shots import (
     BALL,
@@ -187,8 +188,7 @@ def test_steps_end_at_the_boundary(device: Device, name: str) -> None:
 @pytest.mark.parametrize("name", ["hast", pytest.param("menger_sponge", marks=pytest.mark.combination)])
 def test_steps_in_float64(device: Device, name: str) -> None:
     """As precise as float32 channels tell: half of their last digit."""
-    if not has_float64(device.info):
-        return
+    check_usable("float64")
     exact = found_by(device, scene_for(name, "steps"), "float64")
     check_boundary(exact, "float64")
     _, usual = both(device, name)

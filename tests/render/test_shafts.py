@@ -11,6 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
+from tests.render.media import phase
 from tests.render.shots import (
     BALL_RADIUS,
     ORTHOGRAPHIC,
@@ -44,10 +45,6 @@ def scene_with(light: dict[str, Any], samples: int, *, paths: bool = False, **fo
         renderer={"samples": samples},
         **sections,
     )
-
-
-def phase(cosine: Floats, g: float) -> Floats:
-    return np.asarray((1 - g * g) / (4 * math.pi * (1 + g * g - 2 * g * cosine) ** 1.5))
 
 
 def expected(scene: Scene, far: Floats, parts: int = 20_000) -> Floats:
