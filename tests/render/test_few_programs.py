@@ -96,6 +96,33 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     "glass": ({"materials": {"m": GLASS}, "material": {"name": "m"}}, {"glass"}),
     "milk": ({"materials": {"m": MILK}, "material": {"name": "m"}}, {"random_walk", "media"}),
     "skin": ({"materials": {"m": SKIN}, "material": {"name": "m"}}, {"random_walk", "media"}),
+    "glass that scatters nothing": (
+        {
+            "materials": {
+                "m": {
+                    "transmission": {**MILK["transmission"], "scatter": [0, 0, 0], "scatter_anisotropy": 0.5}
+                }
+            },
+            "material": {"name": "m"},
+        },
+        {"glass"},
+    ),
+    # Rays within objects of glass are ordinary rays.
+    "object of glass": (
+        {"objects": {"ball": {**BALL, "material": "m"}}, "materials": {"m": GLASS}},
+        {"objects"},
+    ),
+    "transmission without weight": (
+        {
+            "materials": {"m": {"transmission": {**GLASS["transmission"], "weight": 0, "depth": 2}}},
+            "material": {"name": "m"},
+        },
+        set(),
+    ),
+    "subsurface without weight": (
+        {"materials": {"m": {"subsurface": {"weight": 0, "radius": 2}}}, "material": {"name": "m"}},
+        set(),
+    ),
 }
 # What may be joined to a formula, and in which ways: beside the formulas all of it is data.
 HAST = {"type": "formula", "formula": {"name": "hast", "iterations": 9}, "position": [1, 0, 0]}

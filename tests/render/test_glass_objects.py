@@ -11,8 +11,6 @@ import yaml
 import clfractal
 from clfractal.errors import SceneError
 from clfractal.files.channels import CHANNELS, NOISY
-from clfractal.integrators.plan import make_plan
-from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.glass_scenes import BODIES, FAR_OFF, Floats, ball, colors_of, glass, scene
 from tests.render.path_scenes import BALL, GREY, path, scene_of, seen
@@ -152,14 +150,6 @@ def test_all_that_pixels_keep_has_room(more: dict[str, Any]) -> None:
     assert all(np.isfinite(film[name]).all() for name in CHANNELS if name not in ("Z", *NOISY))
 
 
-def test_sets_that_are_no_glass_have_no_march_within() -> None:
-    """Rays within objects of glass are ordinary rays."""
-    found = scene({"ball": {"type": "sphere", "material": "glass"}}, {"glass": glass()})
-    plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
-    names = [text.name for text in program_texts(found, plan)]
-    assert names == ["rays", "begin", "interactions", "objects", "scatter", "gather"]
-
-
 def test_only_lamps_with_a_size_may_stand_in_glass() -> None:
     values = plain_scene({"ball": {"type": "sphere", "position": [4, 0, 0], "material": "glass"}})
     lamp = {"position": [4, 0, 0.2]}
@@ -255,22 +245,3 @@ def test_a_sun_shines_through_rough_glass() -> None:
     assert colors.mean() > 0.05
     smooth = scene_of(background=dark, lights=[{"direction": [0, -1, 0]}], lighting=path(8))
     assert seen(smooth, 4)[0].mean() < 0.01
-
-
-@pytest.mark.parametrize(
-    "part",
-    [
-        {"transmission": {"color": [0.5, 0.6, 0.7], "depth": 2, "dispersion_scale": 1}},
-        {"subsurface": {"color": [0.5, 0.6, 0.7], "radius": 2}},
-    ],
-    ids=repr,
-)
-def test_scenes_without_it_do_not_know_it(part: dict[str, Any]) -> None:
-    """No program more: a material whose transmission, or what is below its boundary, has no weight is like one without."""
-    texts = []
-    for values in ({}, part):
-        one = scene_of(lighting=path(2), materials={"m": values}, material={"name": "m"})
-        plan = make_plan(one, precision="float32", lanes=4, channels=("R", "G", "B"))
-        texts.append({text.name: text.flat.text for text in program_texts(one, plan)})
-    assert list(texts[0]) == ["rays", "begin", "interactions", "scatter", "gather"]
-    assert texts[0] == texts[1]

@@ -21,6 +21,7 @@ from clfractal.integrators.march import SHADOW_DETAIL, march_record
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
+from tests.render.bits import same_pictures
 
 BLOCKS = 12
 SCENE = """
@@ -56,10 +57,6 @@ def apart(one: Framebuffer, other: Framebuffer) -> float:
     return float(np.abs(a - b).mean() / np.abs(b).mean())
 
 
-def same_bits(one: Framebuffer, other: Framebuffer) -> bool:
-    return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one.channels)
-
-
 # (hast's section was 107 % brighter with one sample, a Julia set's picture 49 %, a Mandelbulb's 37 %.)
 @pytest.mark.parametrize("formula", ["quaternion_julia", "mandelbulb", "hast"])
 def test_samples_and_pixels_leave_the_picture_as_it_is(engine: Engine, formula: str) -> None:
@@ -79,7 +76,7 @@ def test_a_thumbnail_holds_the_print(engine: Engine) -> None:
     thumbnail = engine.render(scene, size=(32, 18))
     held = load_scene(str(thumbnail.header["scene"]))
     assert held.image == Image(width=32, height=18, reference_height=54)
-    assert same_bits(engine.render(held, size=(96, 54)), engine.render(scene))
+    same_pictures(engine.render(held, size=(96, 54)), engine.render(scene))
     assert held.image.resized(96, 54) == scene.image
 
 
@@ -149,6 +146,6 @@ def test_engines_and_functions_take_a_size(engine: Engine) -> None:
     scene = scene_of("mandelbulb")
     framebuffer = engine.render(scene, size=(48, 27))
     assert framebuffer["R"].shape == (27, 48)
-    assert same_bits(framebuffer, render(scene, size=(48, 27)))
+    same_pictures(framebuffer, render(scene, size=(48, 27)))
     last = list(engine.refine(scene, size=(48, 27)))[-1]
-    assert same_bits(framebuffer, last)
+    same_pictures(framebuffer, last)

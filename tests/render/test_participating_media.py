@@ -9,8 +9,6 @@ import numpy.typing as npt
 import pytest
 
 import clfractal
-from clfractal.integrators.plan import make_plan
-from clfractal.integrators.surface import program_texts
 from clfractal.scene.model import Scene
 from tests.render.glass_scenes import BODIES, colors_of, glass, scene
 from tests.render.path_scenes import BLACK, GREY, path, scene_of, seen
@@ -108,16 +106,6 @@ def test_the_eye_in_milk_sees_milk() -> None:
     assert (film["N.Y"] < 0).all()
     assert (film["object"] == film["object"][0, 0]).mean() > 0.99
     assert film["object"][0, 0] > 0
-
-
-@pytest.mark.parametrize("scatter", [None, 0, 1])
-def test_only_glass_that_scatters_has_stages_for_it(scatter: float | None) -> None:
-    given = {} if scatter is None else {"scatter": [scatter] * 3, "scatter_anisotropy": 0.5}
-    materials = {"m": {"transmission": {"weight": 1, "depth": 1, **given}}}
-    found = scene_of(lighting=path(2), materials=materials, material={"name": "m"})
-    plan = make_plan(found, precision="float32", lanes=4, channels=("R", "G", "B"))
-    names = {text.name for text in program_texts(found, plan)}
-    assert names & {"glass", "random_walk", "media"} == ({"random_walk", "media"} if scatter else {"glass"})
 
 
 @pytest.mark.combination

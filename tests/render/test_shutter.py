@@ -14,9 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import clfractal
-from clfractal.camera.views import View
+from clfractal.camera.views import View, scene_view
 from clfractal.engine.engine import Engine
-from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError
 from clfractal.integrators import shutter as shutters
 from clfractal.integrators.shutter import Shutter, shutter_of
@@ -120,16 +119,10 @@ def test_a_view_is_mixed_within_a_part_of_a_pixel_whatever_way_it_goes() -> None
         for time in np.linspace(0, 0.999, 41):
             place = time * (len(poses) - 1)
             before, after = poses[int(place)], poses[int(place) + 1]
-            true = clfractal_view(shutter, float(time))
+            true = scene_view(*shutter.seen(float(time)))
             mixed = (1 - place % 1) * corners(before) + (place % 1) * corners(after)
             off = np.linalg.norm(mixed - corners(true), axis=1).max() / (true.height / 30)
             assert off < (0.2 if len(poses) <= shutters.MOST_SPANS else 1.0)
-
-
-def clfractal_view(shutter: Shutter, time: float) -> View:
-    from clfractal.camera.views import scene_view
-
-    return scene_view(*shutter.seen(time))
 
 
 def corners(view: View) -> Floats:
@@ -272,10 +265,6 @@ def test_a_scene_may_say_which_frame_its_still_shows(engine: Engine) -> None:
     same_pictures(engine.render(still), engine.render(clfractal.at_frame(film, 4)))
 
 
-def identity(job: Job) -> dict[str, Any]:
-    return job.identity(0)
-
-
 def test_unfinished_work_of_another_movement_is_another_picture(engine: Engine) -> None:
     slower = {**PANNING, "camera.target": straight((0, [-1, 0, 0]), (9, [16, 0, 0]))}
     changes: dict[str, Callable[[], Scene]] = {
@@ -283,10 +272,10 @@ def test_unfinished_work_of_another_movement_is_another_picture(engine: Engine) 
         "shutter": lambda: clfractal.at_frame(film_of(PANNING, animation={"shutter": 0.25}), 0),
         "track": lambda: clfractal.at_frame(film_of(slower), 0),
     }
-    first = identity(engine.prepare(clfractal.at_frame(film_of(PANNING), 0)))
-    assert first == identity(engine.prepare(clfractal.at_frame(film_of(PANNING), 0)))
+    first, again = (engine.prepare(clfractal.at_frame(film_of(PANNING), 0)).identity(0) for _ in range(2))
+    assert first == again
     for name, scene in changes.items():
-        assert identity(engine.prepare(scene())) != first, name
+        assert engine.prepare(scene()).identity(0) != first, name
 
 
 # -- bad input

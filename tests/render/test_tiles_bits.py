@@ -11,9 +11,8 @@ import numpy.typing as npt
 import pytest
 
 from clfractal.device.launch import Pace
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
-from clfractal.device.tune import accepted_lanes
 from clfractal.engine import drawing
 from clfractal.engine import local_executor as local
 from clfractal.engine.local_executor import LocalExecutor
@@ -21,11 +20,10 @@ from clfractal.engine.run import run
 from clfractal.engine.stages import Span
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiles import TILE, TileGrid
-from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.passes import kept_numbers
 from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
-from tests.render.bits import close, same
+from tests.render.bits import same
 from tests.render.passes import RENDERERS, scene_with
 from tests.render.passes import SIZE as PASS_SIZE
 from tests.render.shots import (
@@ -215,24 +213,6 @@ def test_the_rest_of_a_film(device: Device, wholes: dict[str, npt.NDArray[np.flo
     assert (result[marked.y :, marked.x :] == 7).all()
     result[marked.y :, marked.x :] = wholes["mandelbulb"][marked.y :, marked.x :]
     assert same(result, wholes["mandelbulb"])
-
-
-@pytest.mark.combination
-@pytest.mark.parametrize("name", ["mandelbulb"])
-def test_every_lane_count(device: Device, wholes: dict[str, npt.NDArray[np.float32]], name: str) -> None:
-    """Packets of another width are another program, whose compiler may fuse other products with sums: the last bits
-    differ, and with them what decides at the rim of a fractal. One pixel in two hundred may."""
-    for lanes in accepted_lanes(device, "float32"):
-        if lanes != best_lanes(device, "float32"):
-            close(stacked(shoot(SCENES[name], device, lanes=lanes)), wholes[name])
-
-
-@pytest.mark.parametrize("name", ["hast", pytest.param("mandelbulb", marks=pytest.mark.combination)])
-def test_float64_shows_the_same(device: Device, name: str) -> None:
-    """Of few iterations: folds of hast are finer than float32 soon."""
-    if has_float64(device.info):
-        scene = scene_of({"name": name, "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
-        close(stacked(shoot(scene, device, "float64")), stacked(shoot(scene, device)))
 
 
 NOISY: dict[str, Any] = {"samples": 16, "noise": 0.02, "min_samples": 4}

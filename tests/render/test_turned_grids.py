@@ -29,14 +29,11 @@ from tests.render.shots import (
     ORTHOGRAPHIC,
     PERSPECTIVE,
     Floats,
-    normals_of,
     points_of,
-    rays,
     shoot,
     stacked,
-    to_sphere,
 )
-from tests.render.volumes import FLAT, LIT, composited, keep, middles, volume_scene
+from tests.render.volumes import FLAT, LIT, check_ball, composited, keep, middles, volume_scene
 from tests.scenes import scene_of
 
 SHAPE = (38, 42, 46)
@@ -76,6 +73,11 @@ def file_of(name: str) -> str:
     return f"{name.replace(' ', '_')}.nrrd"
 
 
+def voxel_of(steps: Floats) -> float:
+    """The longest side."""
+    return float(np.linalg.norm(steps, axis=1).max())
+
+
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("turned")
@@ -85,28 +87,12 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def check_ball(framebuffer: Any, scene: Scene, steps: Floats) -> None:
-    """The ball is where it is, and so are its normals."""
-    origin, direction, _ = rays(scene)
-    t, nearest = to_sphere(origin, direction, CENTER, RADIUS)
-    hit, voxel = framebuffer["A"] == 1, float(np.linalg.norm(steps, axis=1).max())
-    sure = np.abs(nearest - RADIUS) > 0.15 * voxel
-    np.testing.assert_array_equal(hit[sure], (nearest < RADIUS)[sure])
-    clear = nearest < 0.8 * RADIUS
-    assert clear.sum() > 200
-    expected = origin + np.where(clear, t, 0)[..., None] * direction
-    assert np.linalg.norm(points_of(framebuffer) - expected, axis=-1)[clear].max() < 0.15 * voxel
-    outward = points_of(framebuffer) - CENTER
-    cosine = ((normals_of(framebuffer) * outward).sum(-1) / np.linalg.norm(outward, axis=-1))[clear]
-    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < 0.5
-
-
 @pytest.mark.parametrize("name", STEPS)
 @pytest.mark.parametrize("kind", ["perspective", "orthographic", "object"])
 def test_surfaces_and_objects(device: Device, folder: Path, name: str, kind: str) -> None:
     shown: dict[str, Any] = {"folder": folder, "file": file_of(name), "level": 0.0}
     scene = object_scene(**shown) if kind == "object" else volume_scene(CAMERAS[kind], **shown)
-    check_ball(shoot(scene, device), scene, STEPS[name])
+    check_ball(shoot(scene, device), scene, CENTER, RADIUS, voxel_of(STEPS[name]))
 
 
 def object_scene(folder: Path, **volume: Any) -> Scene:
@@ -138,8 +124,7 @@ def test_an_object_is_scaled_along_the_files_axes_and_then_turned(device: Device
     # Back to the file's own space: x was turned to y, and y to -x.
     x, y, z = np.moveaxis(points_of(framebuffer) - [0.1, 0, 0], -1, 0)
     back = np.stack([y, -x, z], -1) / factors
-    voxel = float(np.linalg.norm(steps, axis=1).max())
-    assert np.abs(depth(back))[hit].max() < 0.15 * voxel
+    assert np.abs(depth(back))[hit].max() < 0.15 * voxel_of(steps)
 
 
 OPACITY = [{"at": -0.25, "opacity": 0}, {"at": 0.5, "opacity": 0.5}]
@@ -195,7 +180,7 @@ def test_what_this_program_writes_stays_where_it_was(
     assert shown.given is not None
     np.testing.assert_allclose(shown.given.place.ends, scene.given.place.ends, atol=1e-12)
     if ending == ".nrrd":
-        check_ball(shoot(shown, device), shown, STEPS[name])
+        check_ball(shoot(shown, device), shown, CENTER, RADIUS, voxel_of(STEPS[name]))
 
 
 def test_a_pixel_is_probed_where_it_is(folder: Path) -> None:

@@ -10,9 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.volume_file import Volume, write_volume
+from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
-from tests.render.shots import BALL, Floats, rays
+from tests.render.shots import BALL, Floats, normals_of, points_of, rays, to_sphere
 from tests.scenes import scene_of
 
 # Light that shows a place's own colour, whatever its normal.
@@ -31,7 +32,7 @@ LIT: dict[str, Any] = {
     "background": {"top": [0.5, 0.5, 0.5], "bottom": [0.5, 0.5, 0.5]},
 }
 # To each axis another number of voxels.
-SIDES, BOX = (40, 48, 32), {"center": [0.1, 0.05, -0.1], "size": [2.5, 3.0, 2.0]}
+SIDES = (40, 48, 32)
 
 
 def middles(shape: Sequence[int], corner: npt.ArrayLike, spacing: npt.ArrayLike) -> Floats:
@@ -139,3 +140,21 @@ def composited(
         color += (through * share)[..., None] * tint
         through *= 1 - share
     return color, 1 - through
+
+
+def check_ball(
+    framebuffer: Framebuffer, scene: Scene, center: Floats, radius: float, voxel: float, degrees: float = 0.5
+) -> None:
+    """The ball is where it is, and so are its normals, to a part of a voxel."""
+    origin, direction, _ = rays(scene)
+    t, nearest = to_sphere(origin, direction, center, radius)
+    hit = framebuffer["A"] == 1
+    sure = np.abs(nearest - radius) > 0.15 * voxel
+    np.testing.assert_array_equal(hit[sure], (nearest < radius)[sure])
+    clear = nearest < 0.8 * radius
+    assert clear.sum() > 200
+    expected = origin + np.where(clear, t, 0)[..., None] * direction
+    assert np.linalg.norm(points_of(framebuffer) - expected, axis=-1)[clear].max() < 0.15 * voxel
+    outward = points_of(framebuffer) - center
+    cosine = ((normals_of(framebuffer) * outward).sum(-1) / np.linalg.norm(outward, axis=-1))[clear]
+    assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < degrees
