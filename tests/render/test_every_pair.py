@@ -141,6 +141,12 @@ ALONE = [
     for name, values in each.items()
     for value in values
 ]
+# What a feature needs that is alone.
+NEEDS: dict[tuple[str, str], dict[str, str]] = {
+    ("surface", "residual"): {"points": "grid"},
+    ("surface", "clouds"): {"lighting": "path"},
+    ("volume", "path"): {"transfer": "opacity"},
+}
 VARIANTS = [("float32", 1), ("float32", 4), ("float32", 8), ("float32", 16), ("float64", 1), ("float64", 4)]
 
 
@@ -153,8 +159,7 @@ def test_lanes_and_number_types_show_the_same(
     """Packets of another width are another program, whose last bits differ, and with them what decides at a rim, or which
     way a path goes."""
     check_usable(precision, lanes)
-    points = "grid" if value == "residual" else ""
-    chosen = {"formula": "mandelbulb", **({"points": points} if points else {}), feature: value}
+    chosen = {"formula": "mandelbulb", **NEEDS.get((kind, value), {}), feature: value}
     asked = of(kind, {} if value == "milk" else chosen)
     if value == "milk":
         asked |= {**FORMULAS["mandelbulb"], "materials": MILK, "material": {"name": "milk"}}
