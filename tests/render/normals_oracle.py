@@ -28,9 +28,9 @@ def grid_offsets(side: int) -> Floats:
     return np.array([(right, -below) for below in steps for right in steps])
 
 
-def unit(vectors: Floats) -> Floats:
+def unit(vectors: Floats) -> npt.NDArray[np.float64]:
     """Vectors (..., 3) at length 1."""
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True), np.float64)
 
 
 def least_squares(points: Floats) -> tuple[Floats, Floats]:

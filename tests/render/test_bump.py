@@ -20,8 +20,9 @@ from clfractal.scene.model import Scene
 from tests.devices import check_usable
 from tests.environment_maps import write_map
 from tests.render.levels import orbit
+from tests.render.normals_oracle import unit
 from tests.render.path_scenes import seen
-from tests.render.reliefs import BULB, EYE, Floats, displaced, facts, relief, unit
+from tests.render.reliefs import BULB, EYE, Floats, displaced, facts, relief
 from tests.render.shots import degrees
 from tests.variants import one_of
 

@@ -114,7 +114,7 @@ def test_a_region_is_the_same_part_of_the_whole(data: st.DataObject) -> None:
 
 
 def check_bands(
-    picture: Picture, whole: Mapping[str, np.ndarray], size: tuple[int, int], region: Region
+    picture: Picture, whole: Framebuffer | Mapping[str, np.ndarray], size: tuple[int, int], region: Region
 ) -> None:
     """They are the region's part of the whole, from top to bottom, however often they are read."""
     assert (picture.display, picture.region) == (size, region)

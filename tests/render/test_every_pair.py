@@ -165,10 +165,8 @@ def test_lanes_and_number_types_show_the_same(
         asked |= {**FORMULAS["mandelbulb"], "materials": MILK, "material": {"name": "milk"}}
         asked |= {"lighting": {"mode": "path"}}
     scene, names = read(asked), [name for name in channels(chosen) if name != "steps"]
-    usual, other = (
-        stacked(shoot(scene, device, channels=names, **way), names)
-        for way in ({}, {"precision": precision, "lanes": lanes})
-    )
+    variant: dict[str, Any] = {"precision": precision, "lanes": lanes}
+    usual, other = (stacked(shoot(scene, device, channels=names, **way), names) for way in ({}, variant))
     by_chance = "lighting" in asked or "noise" in feature or scene.environment is not None
     same = np.isclose(usual, other, rtol=1e-3, atol=1e-3).all(axis=-1)
     assert same.mean() > (0.6 if by_chance else 0.9)

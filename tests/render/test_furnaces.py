@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -89,11 +90,11 @@ def body_of(material: dict[str, Any], body: str, bounces: int = 48) -> Scene:
 
 # What is seen of the set alone: scene, samples, and how far from 1 the mean may be.
 SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
-    **{name: (lambda m=m: set_of(m), 64, 0.01) for name, m in MATERIALS.items()},
+    **{name: (partial(set_of, m), 64, 0.01) for name, m in MATERIALS.items()},
     "relief of clay": (lambda: set_of({**RELIEFS["clay"], "bump": {"height": STEEP}}), 64, 0.01),
     **{
         f"glass, {roughness}, {weight}": (
-            lambda r=roughness, w=weight: ball(r, transmission={"weight": w}),
+            partial(ball, roughness, transmission={"weight": weight}),
             16,
             0.01,
         )
@@ -102,10 +103,11 @@ SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
     # However rough the set; hast is dust where pixels are as wide as here.
     **{
         f"glass of {name}": (
-            lambda n=name, i=iterations: ball(
+            partial(
+                ball,
                 0.1,
                 bounces=64,
-                formula={"name": n, "iterations": i},
+                formula={"name": name, "iterations": iterations},
                 camera=CLOSE,
                 renderer={"search": "steps"},
             ),
@@ -136,7 +138,7 @@ SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
 }
 MORE_SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
     **{
-        f"relief of {name}": (lambda n=name: set_of({**RELIEFS[n], "bump": {"height": STEEP}}), 64, 0.01)
+        f"relief of {name}": (partial(set_of, {**RELIEFS[name], "bump": {"height": STEEP}}), 64, 0.01)
         for name in ("metal", "lacquer")
     },
     "relief of glass": (
@@ -151,9 +153,7 @@ MORE_SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
     ),
     **{
         f"glass of {name} by distance": (
-            lambda n=name, i=iterations: ball(
-                0.1, bounces=64, formula={"name": n, "iterations": i}, camera=CLOSE
-            ),
+            partial(ball, 0.1, bounces=64, formula={"name": name, "iterations": iterations}, camera=CLOSE),
             16,
             0.01,
         )
@@ -162,9 +162,10 @@ MORE_SETS: dict[str, tuple[Callable[[], Scene], int, float]] = {
     # Within a set each scattering is a bounce.
     **{
         f"milk, {ior}": (
-            lambda i=ior: ball(
+            partial(
+                ball,
                 0,
-                i,
+                ior,
                 bounces=64,
                 transmission={"depth": 1.0, "scatter_anisotropy": 0.3, "scatter": [1, 1, 1]},
             ),
@@ -261,7 +262,7 @@ PICTURES: dict[str, tuple[Callable[[], Scene], int, float]] = {
 MORE_PICTURES: dict[str, tuple[Callable[[], Scene], int, float]] = {
     **{
         f"{body} of glass, {roughness}": (
-            lambda b=body, r=roughness: body_of(glass(r), b),
+            partial(body_of, glass(roughness), body),
             256 if roughness else 16,
             0.005,
         )
@@ -275,13 +276,13 @@ MORE_PICTURES: dict[str, tuple[Callable[[], Scene], int, float]] = {
     },
     **{
         f"{body} of milk, {ior}, {g}": (
-            lambda b=body, i=ior, g=g: body_of(milk(i, scatter_anisotropy=g), b, 64),
+            partial(body_of, milk(ior, scatter_anisotropy=g), body, 64),
             16,
             0.01,
         )
         for body, ior, g in (("sphere", 1.005, 0.0), ("sphere", 1.5, 0.8), ("cylinder", 1.5, 0.0))
     },
-    **{f"{body} of skin": (lambda b=body: body_of(SOFT, b, 16), 32, 0.01) for body in ("box", "cylinder")},
+    **{f"{body} of skin": (partial(body_of, SOFT, body, 16), 32, 0.01) for body in ("box", "cylinder")},
     "glass in glass": (glass_in_glass, 16, 0.01),
     "holes in rough glass": (lambda: holes(0.4), 32, 0.01),
     "in milk, from outside": (lambda: in_milk([0, 39, 0]), 64, 0.015),

@@ -120,7 +120,7 @@ AROUND = dict.fromkeys(("drop", "core"), BALLS["amber"])
 @pytest.mark.parametrize("ball", one_of("core", *(name for name in BALLS if name != "core")))
 def test_balls_of_glass_agree_with_mitsuba(ball: str, tmp_path: Path) -> None:
     ours, theirs, medium = BALLS[ball]
-    around = AROUND.get(ball, ({}, None, None))
+    around: Any = AROUND.get(ball, ({}, None, None))
     middle = FAR_OFF if ball in OBJECTS else [0.0, 0.0, 0.0]
     bodies = {
         **({"outer": {"type": "sphere", "radius": 2.0, "material": "around"}} if ball in AROUND else {}),

@@ -282,10 +282,10 @@ class TestParallax:
 
 
 class TestScenes:
-    @pytest.mark.parametrize(("size", "told"), [((64, 48), 1.2), ((48, 64), 5.0), ((64, 48), None)])
-    def test_a_plane_of_its_own(self, size: tuple[int, int], told: float | None) -> None:
+    @pytest.mark.parametrize(("size", "own"), [((64, 48), 1.2), ((48, 64), 5.0), ((64, 48), None)])
+    def test_a_plane_of_its_own(self, size: tuple[int, int], own: float | None) -> None:
         """Its corners are the picture's, whatever its proportions, for both eyes; without a height pixels are square."""
-        plane, height = {**PLANE, **({"height": told} if told else {})}, told or 3.0 * 48 / 64
+        plane, height = {**PLANE, **({"height": own} if own else {})}, own or 3.0 * 48 / 64
         scene = scene_of(BALL, CAMERA, size, stereo={"plane": plane})
         normal = unit(plane["normal"])
         across = unit(np.cross(plane["up"], normal))
