@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import count
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +14,7 @@ import pytest
 from clfractal.cli import render
 from clfractal.cli.progress import Reporter
 from clfractal.cli.shell import Shell
-from clfractal.engine import drawing
+from clfractal.engine import drawing, run
 from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
 
@@ -43,3 +47,18 @@ def watched(monkeypatch: pytest.MonkeyPatch, stop_at: int | None = None) -> list
 def planes(path: Path) -> dict[str, bytes]:
     """The bytes of every channel."""
     return {name: np.ascontiguousarray(plane).tobytes() for name, plane in read_exr(path)[0].items()}
+
+
+@contextmanager
+def interrupted_at(number: int) -> Iterator[None]:
+    """Ctrl-C before the numbered picture (a frame, a slice) that the shell would begin as the so-manieth."""
+    begun, render = count(1), run.run
+
+    def interrupted(*arguments: Any, **settings: Any) -> Any:
+        if next(begun) == number:
+            raise KeyboardInterrupt
+        return render(*arguments, **settings)
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("clfractal.cli.numbered.run", interrupted)
+        yield

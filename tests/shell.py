@@ -41,6 +41,12 @@ class Ended:
         return True
 
 
+def works(ended: Ended) -> Ended:
+    """What a run that shall end well told."""
+    assert ended.status == 0, ended
+    return ended
+
+
 class InProcess:
     """Calls the program as a function, in the current folder."""
 

@@ -13,12 +13,12 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.cli.film_parts import frames_of
 from clfractal.engine import run as work
 from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
 from clfractal.files.frame_names import frame_file
-from tests.shell import InProcess, command, environment
+from tests.interrupts import interrupted_at
+from tests.shell import InProcess, command, environment, works
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 6}
@@ -38,8 +38,7 @@ def names() -> list[str]:
 
 
 def test_each_frame_is_the_picture_of_its_scene(clf: InProcess) -> None:
-    ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png"))
     assert ended.err.splitlines()[-1].startswith("f_00.exr to f_04.exr: 5 frames, ")
     assert names() == [*(f"f_0{i}.exr" for i in range(5)), *(f"p{i}.png" for i in range(5))]
     films = dict(clfractal.frames("scene.yaml"))
@@ -62,7 +61,7 @@ def test_a_part_of_the_film_and_the_default_name(clf: InProcess) -> None:
 
 
 def test_render_shows_the_scene_as_it_stands(clf: InProcess) -> None:
-    assert clf("render", "scene.yaml", "-o", "a.exr").status == 0
+    works(clf("render", "scene.yaml", "-o", "a.exr"))
     still = clfractal.load_scene(SCENE).model_copy(update={"animation": None})
     np.testing.assert_array_equal(read_exr("a.exr")[0]["Z"], clfractal.render(still)["Z"])
     assert clfractal.load_scene("a.exr").animation == clfractal.load_scene(SCENE).animation
@@ -84,19 +83,9 @@ def test_exposure_is_measured_once_for_all_frames(clf: InProcess) -> None:
     assert stops != {0.0}
 
 
-def test_interrupted_the_finished_frames_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    render, calls = work.run, []
-
-    def interrupted(*arguments: Any, **settings: Any) -> Any:
-        calls.append(arguments)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return render(*arguments, **settings)
-
-    with monkeypatch.context() as patch:
-        patch.setattr("clfractal.cli.numbered.run", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            clf("animate", "scene.yaml", "-o", "f#.png")
+def test_interrupted_the_finished_frames_stay(clf: InProcess) -> None:
+    with interrupted_at(3):
+        clf("animate", "scene.yaml", "-o", "f#.png")
     assert names() == ["f0.png", "f1.png"]
     kept = [Path(name).stat().st_mtime_ns for name in names()]
     ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume")
@@ -108,7 +97,7 @@ def test_interrupted_the_finished_frames_stay(clf: InProcess, monkeypatch: pytes
 
 
 def test_frames_of_another_scene_are_refused(clf: InProcess) -> None:
-    assert clf("animate", "scene.yaml", "-o", "f#.png").status == 0
+    works(clf("animate", "scene.yaml", "-o", "f#.png"))
     before = Path("f0.png").read_bytes()
     ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume", "--set", "material.ambient=0.3")
     assert ended.is_one_line(2, "f0.png: is a frame of another scene, or of other settings; remove it")
@@ -117,7 +106,7 @@ def test_frames_of_another_scene_are_refused(clf: InProcess) -> None:
     assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").is_one_line(2, "f2.png: ")
     assert Path("f2.png").read_text() == "my notes"
     Path("f2.png").write_bytes(whole[:100])
-    assert clf("animate", "scene.yaml", "-o", "f#.png", "--resume").status == 0
+    works(clf("animate", "scene.yaml", "-o", "f#.png", "--resume"))
     assert len(Path("f2.png").read_bytes()) > 0.9 * len(whole)
     assert Path("f0.png").read_bytes() == before
 
@@ -137,7 +126,7 @@ def test_a_frame_in_work_keeps_its_tiles(clf: InProcess, monkeypatch: pytest.Mon
         with pytest.raises(KeyboardInterrupt):
             clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64")
     assert names() == ["f1.exr.partial"]
-    assert clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64", "--resume").status == 0
+    works(clf("animate", "scene.yaml", "-o", "f#.exr", *size, "--samples", "64", "--resume"))
     assert names() == ["f1.exr"]
 
 
@@ -154,8 +143,8 @@ def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
         running.wait()
         for file in Path().glob("k?.exr"):
             read_exr(file)
-    assert clf("animate", "scene.yaml", "-o", "k#.exr", "--resume", *size).status == 0
-    assert clf("animate", "scene.yaml", "-o", "w#.exr", *size).status == 0
+    works(clf("animate", "scene.yaml", "-o", "k#.exr", "--resume", *size))
+    works(clf("animate", "scene.yaml", "-o", "w#.exr", *size))
     for number in range(2):
         one, other = (read_exr(f"{word}{number}.exr")[0] for word in "kw")
         for channel in one:
@@ -246,13 +235,6 @@ def test_a_track_of_what_an_override_removes_is_refused_at_its_line(
     assert names() == []
 
 
-def test_no_output_replaces_the_scene(clf: InProcess) -> None:
-    assert clf("animate", "scene.yaml", "--frames", "0", "-o", "scene#.png").status == 0
-    Path("in0.png").write_bytes(Path("scene0.png").read_bytes())
-    ended = clf("animate", "in0.png", "-o", "in#.png", "--set", "animation={frames: 2}")
-    assert ended.is_one_line(2, "in0.png: ")
-
-
 def test_arguments_of_python_are_checked() -> None:
     with pytest.raises(SceneError, match="numbers: must be from 0 to 4, got 5"):
         clfractal.frames(SCENE, numbers=[5])
@@ -264,8 +246,6 @@ def test_arguments_of_python_are_checked() -> None:
         clfractal.frames({"version": 1, "formula": {"name": "hast"}, "camera": {}})
 
 
-def test_numbers_and_names_of_frames() -> None:
-    assert list(frames_of("3", 5)) == [3]
-    assert list(frames_of(" 0-4:2 ", 5)) == [0, 2, 4]
+def test_names_of_frames() -> None:
     assert frame_file(Path("a/f_###.png"), 7) == Path("a/f_007.png")
     assert frame_file(Path("a#b##.exr"), 1234) == Path("a#b1234.exr")

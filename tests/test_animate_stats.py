@@ -10,7 +10,7 @@ import pytest
 
 from clfractal.device.select import choose
 from tests.halves import halves_of
-from tests.shell import InProcess
+from tests.shell import InProcess, works
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 6}
@@ -29,10 +29,11 @@ def told(path: str = "s.json") -> dict[str, Any]:
 
 
 def test_sums_and_frames(clf: InProcess) -> None:
-    ended = clf("animate", "scene.yaml", "-o", "f#.png", "--frames", "1-3", "--stats", "s.json", "--verbose")
-    assert ended.status == 0, ended
+    ended = works(
+        clf("animate", "scene.yaml", "-o", "f#.png", "--frames", "1-3", "--stats", "s.json", "--verbose")
+    )
     values = told()
-    assert clf("render", "scene.yaml", "-o", "a.png", "--stats", "one.json").status == 0
+    works(clf("render", "scene.yaml", "-o", "a.png", "--stats", "one.json"))
     assert list(values) == [*told("one.json"), "frames_kept", "frames"]
     assert [frame["frame"] for frame in values["frames"]] == [1, 2, 3]
     assert values["frames_kept"] == 0
@@ -51,13 +52,13 @@ def test_sums_and_frames(clf: InProcess) -> None:
 
 
 def test_kept_frames_are_counted_and_films_are_written_too(clf: InProcess) -> None:
-    assert clf("animate", "scene.yaml", "-o", "f#.png", "--frames", "0-1").status == 0
+    works(clf("animate", "scene.yaml", "-o", "f#.png", "--frames", "0-1"))
     order = ("animate", "scene.yaml", "-o", "f#.png", "--resume", "--stats", "s.json")
-    assert clf(*order).status == 0
+    works(clf(*order))
     assert (told()["frames_kept"], [frame["frame"] for frame in told()["frames"]]) == (2, [2, 3])
-    assert clf(*order).status == 0
+    works(clf(*order))
     assert (told()["frames_kept"], told()["frames"], told()["rays"]) == (4, [], 0)
-    assert clf("animate", "scene.yaml", "-o", "film.mkv", "--stats", "film.json").status == 0
+    works(clf("animate", "scene.yaml", "-o", "film.mkv", "--stats", "film.json"))
     values = told("film.json")
     assert values["write_ms"] > sum(frame["write_ms"] for frame in values["frames"]) + 1
 
@@ -68,21 +69,22 @@ def test_number_types_and_no_view_of_two_eyes(clf: InProcess) -> None:
     near = f"animation.tracks={{camera.position: {{keys: [{keys}]}}}}"
     target = "camera.target=[0.655, -0.751, 0.519]"
     stereo = "stereo={mode: split, separation: 0.1}"
-    ended = clf(
-        "animate",
-        "scene.yaml",
-        "-o",
-        "f#.png",
-        "--stats",
-        "s.json",
-        "--set",
-        near,
-        "--set",
-        target,
-        "--set",
-        stereo,
+    works(
+        clf(
+            "animate",
+            "scene.yaml",
+            "-o",
+            "f#.png",
+            "--stats",
+            "s.json",
+            "--set",
+            near,
+            "--set",
+            target,
+            "--set",
+            stereo,
+        )
     )
-    assert ended.status == 0, ended
     assert told()["precision"] == "float32, float64"
     assert "stereo" not in told()
     assert told()["rays"] == 4 * 2 * 80 * 64 * 2
@@ -90,8 +92,7 @@ def test_number_types_and_no_view_of_two_eyes(clf: InProcess) -> None:
 
 def test_each_device_has_its_share(clf: InProcess) -> None:
     halves = halves_of(choose())
-    ended = clf("animate", "scene.yaml", "-o", "f#.png", "--stats", "s.json", "--device", halves)
-    assert ended.status == 0, ended
+    works(clf("animate", "scene.yaml", "-o", "f#.png", "--stats", "s.json", "--device", halves))
     shares = told()["devices"]
     assert sum(share["tiles"] for share in shares) == 4 * TILES
     assert sum(share["rays"] for share in shares) == told()["rays"]

@@ -16,7 +16,7 @@ from clfractal.device import drivers_folder, program, select
 from clfractal.integrators import surface
 from clfractal.integrators.kernel import ProgramText
 from tests.files.limits import file_size_limit
-from tests.shell import SCENE, InProcess, command, environment
+from tests.shell import SCENE, InProcess, command, environment, works
 
 INLINE = """version: 1
 camera: {{position: [0, -3, 0]}}
@@ -34,19 +34,19 @@ formula:
 NESTED = "(" * 10_000 + "x" + ")" * 10_000
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder: a good scene and the outputs of an earlier run."""
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    (tmp_path / "old.png").write_bytes(b"an earlier picture")
-    (tmp_path / "old.exr").write_bytes(b"an earlier picture")
-    return tmp_path
+@pytest.fixture(autouse=True)
+def _earlier(here: Path) -> None:
+    """The outputs of an earlier run."""
+    for name in ("old.png", "old.exr"):
+        (here / name).write_bytes(b"an earlier picture")
 
 
 @pytest.fixture
-def shell(capsys: pytest.CaptureFixture[str]) -> InProcess:
-    return InProcess(capsys)
+def uncompiled(tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch) -> None:
+    """No program is kept, on the disk or in memory."""
+    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
+    monkeypatch.setenv("CLFRACTAL_LANES", "1")
+    select.choose().loaded.clear()
 
 
 def untouched(here: Path) -> bool:
@@ -104,8 +104,8 @@ def untouched(here: Path) -> bool:
         (["--stats", "nowhere/s.json"], ["nowhere/s.json: cannot be written: there is no folder"]),
     ],
 )
-def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts: list[str]) -> None:
-    ended = shell("render", "scene.yaml", "-o", "old.png", "-o", "old.exr", *options)
+def test_a_wrong_option(here: Path, clf: InProcess, options: list[str], parts: list[str]) -> None:
+    ended = clf("render", "scene.yaml", "-o", "old.png", "-o", "old.exr", *options)
     assert ended.is_one_line(2, *parts)
     assert untouched(here)
 
@@ -140,9 +140,9 @@ def test_a_wrong_option(here: Path, shell: InProcess, options: list[str], parts:
         ("environment:\n  file: old.exr", "6:9: environment.file: old.exr "),
     ],
 )
-def test_a_scene_that_cannot_work(here: Path, shell: InProcess, lines: str, message: str) -> None:
+def test_a_scene_that_cannot_work(here: Path, clf: InProcess, lines: str, message: str) -> None:
     (here / "wrong.yaml").write_text(SCENE + lines + "\n")
-    ended = shell("render", "wrong.yaml", "-o", "old.png", "-o", "old.exr")
+    ended = clf("render", "wrong.yaml", "-o", "old.png", "-o", "old.exr")
     assert ended.is_one_line(2, f"wrong.yaml:{message}")
     assert untouched(here)
 
@@ -156,17 +156,13 @@ def test_a_scene_that_cannot_work(here: Path, shell: InProcess, lines: str, mess
         ("scene.yaml/x.png", "scene.yaml/x.png: cannot be written: 'scene.yaml' is not a folder"),
         ("/dev/full", "/dev/full: needs an extension"),
         ("folder.png", "folder.png: cannot be written: it is a folder"),
+        ("/proc/x.png", "/proc/x.png: cannot be written"),  # a file system that takes no files
     ],
 )
-def test_an_output_that_cannot_be_written(here: Path, shell: InProcess, output: str, message: str) -> None:
+def test_an_output_that_cannot_be_written(here: Path, clf: InProcess, output: str, message: str) -> None:
     (here / "folder.png").mkdir()
-    assert shell("render", "scene.yaml", "-o", "old.exr", "-o", output).is_one_line(2, message)
+    assert clf("render", "scene.yaml", "-o", "old.exr", "-o", output).is_one_line(2, message)
     (here / "folder.png").rmdir()
-    assert untouched(here)
-
-
-def test_a_file_system_that_takes_no_files(here: Path, shell: InProcess) -> None:
-    assert shell("render", "scene.yaml", "-o", "/proc/x.png").is_one_line(2, "/proc/x.png: cannot be written")
     assert untouched(here)
 
 
@@ -188,15 +184,15 @@ def test_a_file_system_that_takes_no_files(here: Path, shell: InProcess) -> None
         ('["a", "y", "z"]\n    let: {a: "a + x"}', ["formula.inline.let.a: "]),
     ],
 )
-def test_a_wrong_formula(here: Path, shell: InProcess, expressions: str, parts: list[str]) -> None:
+def test_a_wrong_formula(here: Path, clf: InProcess, expressions: str, parts: list[str]) -> None:
     (here / "wrong.yaml").write_text(INLINE.format(map=expressions))
-    assert shell("render", "wrong.yaml", "-o", "old.png").is_one_line(2, "wrong.yaml:", *parts)
+    assert clf("render", "wrong.yaml", "-o", "old.png").is_one_line(2, "wrong.yaml:", *parts)
     assert untouched(here)
 
 
-def test_the_formulas_above_fail_for_what_they_say(here: Path, shell: InProcess) -> None:
+def test_the_formulas_above_fail_for_what_they_say(here: Path, clf: InProcess) -> None:
     (here / "right.yaml").write_text(INLINE.format(map='["x*x - y*y - z*z", "2*x*y", "2*x*z"]'))
-    assert shell("check", "right.yaml").status == 0
+    works(clf("check", "right.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -210,76 +206,63 @@ def test_the_formulas_above_fail_for_what_they_say(here: Path, shell: InProcess)
         ("picture", "picture:"),
     ],
 )
-def test_a_scene_that_cannot_be_read(here: Path, shell: InProcess, name: str, message: str) -> None:
+def test_a_scene_that_cannot_be_read(here: Path, clf: InProcess, name: str, message: str) -> None:
     (here / "picture").write_bytes(b"\x89PNG\r\n\x1a\n")
     (here / "inside.yaml").write_text("version: 1")
-    ended = shell("render", name, "-o", "old.exr")
+    ended = clf("render", name, "-o", "old.exr")
     (here / "picture").unlink()
     assert ended.is_one_line(2, message)
     assert untouched(here)
 
 
-def test_a_pipe_as_a_scene_is_not_waited_for(here: Path, shell: InProcess) -> None:
+def test_a_pipe_as_a_scene_is_not_waited_for(here: Path, clf: InProcess) -> None:
     os.mkfifo(here / "pipe.yaml")
-    assert shell("check", "pipe.yaml").is_one_line(2, "pipe.yaml: is not a regular file")
+    assert clf("check", "pipe.yaml").is_one_line(2, "pipe.yaml: is not a regular file")
 
 
 @pytest.mark.parametrize("name", ["whole.exr", "whole.png"])
-def test_a_picture_cut_short_as_a_scene(here: Path, shell: InProcess, name: str) -> None:
-    assert shell("render", "scene.yaml", "-o", name, "--quiet").status == 0
+def test_a_picture_cut_short_as_a_scene(here: Path, clf: InProcess, name: str) -> None:
+    works(clf("render", "scene.yaml", "-o", name, "--quiet"))
     whole = (here / name).read_bytes()
     (here / name).unlink()
     for length in (6, 100, 700, len(whole) // 2, len(whole) - 1):
         cut = here / f"cut{Path(name).suffix}"
         cut.write_bytes(whole[:length])
-        ended = shell("render", cut.name, "-o", "old.exr")
+        ended = clf("render", cut.name, "-o", "old.exr")
         cut.unlink()
         assert ended.is_one_line(2, f"{cut.name}:")
     assert untouched(here)
 
 
-def test_a_picture_is_not_replaced_by_its_own(here: Path, shell: InProcess) -> None:
-    assert shell("render", "scene.yaml", "-o", "mine.png", "--quiet").status == 0
-    assert shell("render", "mine.png").is_one_line(2, "mine.png: would be overwritten", "name another")
-
-
-def test_a_full_disk(here: Path, shell: InProcess) -> None:
-    assert shell("render", "scene.yaml", "-o", "built.png", "--quiet").status == 0  # its program is there now
+def test_a_full_disk(here: Path, clf: InProcess) -> None:
+    assert clf("render", "scene.yaml", "-o", "built.png", "--quiet").status == 0  # its program is there now
     (here / "built.png").unlink()
     for output in ("old.png", "old.exr"):
         with file_size_limit(4096):
-            ended = shell("render", "scene.yaml", "-o", output, "--quiet")
+            ended = clf("render", "scene.yaml", "-o", output, "--quiet")
         assert ended.is_one_line(2, f"{output}.partial: cannot be written: ")
         assert untouched(here)
 
 
-def test_no_room_for_what_the_compiler_is_told(
-    here: Path, shell: InProcess, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
-    monkeypatch.setenv("CLFRACTAL_LANES", "1")
-    select.choose().loaded.clear()
+@pytest.mark.usefixtures("uncompiled")
+def test_no_room_for_what_the_compiler_is_told(here: Path, clf: InProcess) -> None:
     with file_size_limit(4096):
-        ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
+        ended = clf("render", "scene.yaml", "-o", "old.png", "--quiet")
     assert ended.is_one_line(2, "ulimit -f: allows files of 4096 bytes", "compiled programs")
     (here / "old.png.partial").unlink(missing_ok=True)
     assert untouched(here)
 
 
-def test_no_room_for_temporary_files(
-    here: Path, shell: InProcess, tmp_path_factory: pytest.TempPathFactory, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.mark.usefixtures("uncompiled")
+def test_no_room_for_temporary_files(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     """The folder is named that has none, and not one in it whose name nobody knows."""
-    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path_factory.mktemp("empty")))
-    monkeypatch.setenv("CLFRACTAL_LANES", "1")
-    select.choose().loaded.clear()
 
     def full(path: Path, *_: object, **__: object) -> int:
         raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     with monkeypatch.context() as patch:
         patch.setattr(Path, "write_text", full)
-        ended = shell("render", "scene.yaml", "-o", "old.png", "--quiet")
+        ended = clf("render", "scene.yaml", "-o", "old.png", "--quiet")
     assert ended.is_one_line(
         2, f"{drivers_folder.path().parent}: has no room for temporary files: No space left"
     )
@@ -288,7 +271,7 @@ def test_no_room_for_temporary_files(
 
 
 def test_a_disk_that_is_full_when_the_picture_is_written(
-    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+    here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The work is kept: with space again, --resume only has to write the files."""
 
@@ -299,11 +282,10 @@ def test_a_disk_that_is_full_when_the_picture_is_written(
     with monkeypatch.context() as patch:
         patch.setattr(os, "fsync", full)  # where a file system tells that a delayed write found no room
         for output in ("old.png", "old.exr"):
-            ended = shell("render", "scene.yaml", "-o", output, "--quiet")
+            ended = clf("render", "scene.yaml", "-o", output, "--quiet")
             assert ended.is_one_line(2, f"{output}: cannot be written: No space left on device")
             assert (here / output).read_bytes() == b"an earlier picture"
-    ended = shell("render", "scene.yaml", "-o", "old.png", "--resume")
-    assert ended.status == 0
+    ended = works(clf("render", "scene.yaml", "-o", "old.png", "--resume"))
     assert "nothing was left to render" in ended.err
     (here / "old.exr.partial").unlink()
     assert {path.name for path in here.iterdir()} == {"scene.yaml", "old.png", "old.exr"}
@@ -335,9 +317,7 @@ def test_no_device_at_all(here: Path) -> None:
     assert untouched(here)
 
 
-def test_a_device_with_too_little_memory(
-    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_device_with_too_little_memory(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     describe = select._describe
 
     def tiny(index: str, platform: object, device: object) -> select.DeviceInfo:
@@ -345,12 +325,12 @@ def test_a_device_with_too_little_memory(
 
     monkeypatch.setattr(select, "_describe", tiny)
     monkeypatch.setattr(select, "_find", select._find.__wrapped__)  # anew, not as remembered
-    ended = shell("render", "scene.yaml", "-o", "old.png")
+    ended = clf("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(2, "rendering needs ", " MiB of device memory, ", "has 0.0 MiB")
     assert untouched(here)
 
 
-def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kernel_that_does_not_build(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     texts = surface.program_texts
 
     def broken(*arguments: object) -> list[ProgramText]:
@@ -366,34 +346,34 @@ def test_a_kernel_that_does_not_build(here: Path, shell: InProcess, monkeypatch:
     # However slow the machine is: a line about a long compilation is not what is tested.
     monkeypatch.setattr(program, "_REMARK_SECONDS", 600.0)
     monkeypatch.setattr(progress, "SILENT_SECONDS", 600.0)
-    ended = shell("render", "scene.yaml", "-o", "old.png")
+    ended = clf("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "find_interactions.cl:", "vod")
-    told = shell("render", "scene.yaml", "-o", "old.png", "--verbose")
+    told = clf("render", "scene.yaml", "-o", "old.png", "--verbose")
     assert told.status == 3
     assert " | STAGE(find_interactions)" in told.err.split("\n", 1)[1]
     assert untouched(here)
 
 
-def test_a_driver_that_aborts(here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_driver_that_aborts(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     """The child process that compiles plays a driver whose compiler calls abort()."""
-    shell("render", "scene.yaml", "-o", "warm.png", "--quiet")  # the lanes have been measured
+    clf("render", "scene.yaml", "-o", "warm.png", "--quiet")  # the lanes have been measured
     (here / "warm.png").unlink()
     monkeypatch.setenv("CLFRACTAL_TEST_ABORT", "surface")
     monkeypatch.setenv("CLFRACTAL_CACHE", str(here / "cache.yaml"))
     monkeypatch.setenv("CLFRACTAL_LANES", "1")
-    ended = shell("render", "scene.yaml", "-o", "old.png")
+    ended = clf("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "the driver aborted (signal 6) while building")
     assert untouched(here)
 
 
 def test_a_mistake_of_ours_is_one_line_too(
-    here: Path, shell: InProcess, monkeypatch: pytest.MonkeyPatch
+    here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fails(*_arguments: object) -> None:
         raise IndexError("of an array\nwith two lines")
 
     monkeypatch.setattr(surface, "program_texts", fails)
-    ended = shell("render", "scene.yaml", "-o", "old.png")
+    ended = clf("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "internal error", "IndexError: of an array with two lines")
-    assert "Traceback" in shell("render", "scene.yaml", "-o", "old.png", "--verbose").err
+    assert "Traceback" in clf("render", "scene.yaml", "-o", "old.png", "--verbose").err
     assert untouched(here)

@@ -14,7 +14,7 @@ import pytest
 from clfractal.cli.program import app
 from clfractal.formulas import catalog
 from tests.makers import DOCS, maker
-from tests.shell import InProcess, command, environment, process
+from tests.shell import InProcess, command, environment, process, works
 
 COMMANDS = {str(each.name or each.callback.__name__) for each in app.registered_commands if each.callback}
 
@@ -44,8 +44,7 @@ def variables(shell: str, words: list[str]) -> dict[str, str]:
     ],
 )
 def test_words_are_completed(shell: str, words: list[str], wanted: str, tmp_path: Path) -> None:
-    ended = process([], tmp_path, variables(shell, words))
-    assert ended.status == 0
+    ended = works(process([], tmp_path, variables(shell, words)))
     assert wanted in ended.out
     assert "voxelize" not in ended.out  # and nothing else is offered
     assert ended.err == ""
@@ -53,8 +52,7 @@ def test_words_are_completed(shell: str, words: list[str], wanted: str, tmp_path
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
 def test_each_shell_has_its_script(shell: str, tmp_path: Path) -> None:
-    ended = process([], tmp_path, {"_CLFRACTAL_COMPLETE": f"source_{shell}"})
-    assert ended.status == 0
+    ended = works(process([], tmp_path, {"_CLFRACTAL_COMPLETE": f"source_{shell}"}))
     assert "clfractal" in ended.out
     assert f"complete_{shell}" in ended.out
     assert ended.err == ""

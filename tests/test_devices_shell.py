@@ -21,7 +21,7 @@ from clfractal.files.exr import read_exr
 from tests.halves import halves_of
 from tests.interrupts import planes
 from tests.long_renders import ENDLESS, HEAVY, LIMIT_SECONDS, PROMISE_SECONDS, TILES, interrupt
-from tests.shell import Ended, InProcess, command, environment, process
+from tests.shell import Ended, InProcess, command, environment, process, works
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
@@ -72,8 +72,7 @@ def test_killed_and_resumed_by_one_and_by_several(whole: Path, halves: str, tmp_
 
 def test_the_header_and_the_statistics_name_the_devices(whole: Path, halves: str, tmp_path: Path) -> None:
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    ended = render(tmp_path, "--device", halves, "--stats", "stats.json", "--verbose")
-    assert ended.status == 0
+    ended = works(render(tmp_path, "--device", halves, "--stats", "stats.json", "--verbose"))
     assert planes(tmp_path / "out.exr") == planes(whole)
     shares = json.loads((tmp_path / "stats.json").read_text())["devices"]
     header = read_exr(tmp_path / "out.exr")[1]
@@ -185,8 +184,7 @@ def test_a_film_by_several_devices(halves: str, tmp_path: Path) -> None:
     scene += "animation: {frames: 3, tracks: {camera.fov: {keys: [{frame: 0, value: 30}, {frame: 2, value: 40}]}}}\n"
     (tmp_path / "film.yaml").write_text(scene)
     for name, device in (("one", halves.split("/")[0]), ("two", halves)):
-        ended = process(["animate", "film.yaml", "-o", f"{name}_#.exr", "--device", device], tmp_path)
-        assert ended.status == 0, ended
+        works(process(["animate", "film.yaml", "-o", f"{name}_#.exr", "--device", device], tmp_path))
     for number in range(3):
         assert planes(tmp_path / f"one_{number}.exr") == planes(tmp_path / f"two_{number}.exr")
         assert "clfractalDevices" in read_exr(tmp_path / f"two_{number}.exr")[1]

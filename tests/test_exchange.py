@@ -23,10 +23,11 @@ from clfractal.integrators.vertices import on_faces
 from clfractal.scene import given
 from clfractal.scene import load as load_module
 from clfractal.scene.load import load_scene
-from tests.shell import Ended, InProcess, command, environment
+from tests.calls import counted
+from tests.shell import InProcess, command, environment, works
 
 # Squaring quaternions without adding anything: inside is the unit ball, of which the slice is one, too.
-BALL = """version: 1
+SCENE = """version: 1
 formula: {name: quaternion_julia, iterations: 12, julia: [0, 0, 0, 0]}
 camera: {position: [0, -3, 0]}
 coloring: {by: normal}
@@ -37,19 +38,6 @@ STEP = 1 / 12
 SHAPE = (27, 30, 36)
 CORNER = np.array([0.1, -0.05, 0]) - np.array([3, 2.5, 2.25]) / 2
 COMMON = ("--resolution", "36", "--set", BOX)
-
-
-@pytest.fixture
-def shell(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> InProcess:
-    """The program, in a folder that has the scene."""
-    (tmp_path / "ball.yaml").write_text(BALL)
-    monkeypatch.chdir(tmp_path)
-    return InProcess(capsys)
-
-
-def works(ended: Ended) -> bool:
-    assert ended.status == 0, ended
-    return True
 
 
 def load(path: str) -> Any:
@@ -63,10 +51,9 @@ def middles() -> Any:
     return CORNER + (np.stack([x, y, z], axis=-1) + 0.5) * STEP
 
 
-def test_a_scene_becomes_a_volume(shell: InProcess) -> None:
-    ended = shell("voxelize", "ball.yaml", "-o", "ball.nrrd", *COMMON)
-    assert works(ended)
-    assert "ball.yaml: 36 x 30 x 27 voxels need 29.2 kB of memory," in ended.err
+def test_a_scene_becomes_a_volume(clf: InProcess) -> None:
+    ended = works(clf("voxelize", "scene.yaml", "-o", "ball.nrrd", *COMMON))
+    assert "scene.yaml: 36 x 30 x 27 voxels need 29.2 kB of memory," in ended.err
     assert "ball.nrrd: 36 x 30 x 27 voxels, " in ended.err
     values, header = pynrrd.read("ball.nrrd", index_order="C")
     radius = np.linalg.norm(middles(), axis=-1)
@@ -83,10 +70,10 @@ def test_a_scene_becomes_a_volume(shell: InProcess) -> None:
     assert scene.renderer.resolution == 36
 
 
-def test_npy_gzip_and_other_values(shell: InProcess) -> None:
+def test_npy_gzip_and_other_values(clf: InProcess) -> None:
     more = ("--set", "renderer.value=iterations", "--set", "renderer.store=float", "-q")
-    assert works(shell("voxelize", "ball.yaml", "-o", "ball.npy", *COMMON, *more))
-    assert works(shell("voxelize", "ball.yaml", "-o", "ball.nrrd", "--gzip", *COMMON, *more))
+    works(clf("voxelize", "scene.yaml", "-o", "ball.npy", *COMMON, *more))
+    works(clf("voxelize", "scene.yaml", "-o", "ball.nrrd", "--gzip", *COMMON, *more))
     plain, packed = read_volume("ball.npy"), read_volume("ball.nrrd")
     assert np.array_equal(np.load("ball.npy"), packed.values)
     assert np.array_equal(plain.origin, packed.origin)
@@ -99,9 +86,10 @@ def test_npy_gzip_and_other_values(shell: InProcess) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".obj", ".glb"])
-def test_a_scene_becomes_a_mesh(suffix: str, shell: InProcess) -> None:
-    ended = shell("mesh", "ball.yaml", "-o", f"ball{suffix}", *COMMON, "--set", "renderer.value=coverage")
-    assert works(ended)
+def test_a_scene_becomes_a_mesh(suffix: str, clf: InProcess) -> None:
+    ended = works(
+        clf("mesh", "scene.yaml", "-o", f"ball{suffix}", *COMMON, "--set", "renderer.value=coverage")
+    )
     mesh = load(f"ball{suffix}")
     assert f"ball{suffix}: {len(mesh.vertices):,} vertices, {len(mesh.faces):,} triangles, " in ended.err
     points, normals = np.asarray(mesh.vertices), np.asarray(mesh.vertex_normals)
@@ -121,47 +109,45 @@ def test_a_scene_becomes_a_mesh(suffix: str, shell: InProcess) -> None:
     assert np.abs(colors[:, :3] / np.iinfo(colors.dtype).max - wanted).max() < 1 / 200
 
 
-def test_a_volume_of_ours_remembers_its_formula(shell: InProcess) -> None:
-    assert works(shell("voxelize", "ball.yaml", "-o", "ball.nrrd", *COMMON, "-q"))
-    assert works(shell("mesh", "ball.nrrd", "-o", "from_volume.ply", "-q"))
-    assert works(shell("mesh", "ball.yaml", "-o", "from_scene.ply", *COMMON, "-q"))
+def test_a_volume_of_ours_remembers_its_formula(clf: InProcess) -> None:
+    works(clf("voxelize", "scene.yaml", "-o", "ball.nrrd", *COMMON, "-q"))
+    works(clf("mesh", "ball.nrrd", "-o", "from_volume.ply", "-q"))
+    works(clf("mesh", "scene.yaml", "-o", "from_scene.ply", *COMMON, "-q"))
     assert Path("from_volume.ply").read_bytes() == Path("from_scene.ply").read_bytes()
 
 
-def test_other_colors(shell: InProcess) -> None:
-    common = ("mesh", "ball.yaml", "-o", "ball.ply", *COMMON)
-    assert works(shell(*common, "--set", "coloring.by=solid", "-q"))
-    color = encode(np.array(load_scene(BALL).material.color))
+def test_other_colors(clf: InProcess) -> None:
+    common = ("mesh", "scene.yaml", "-o", "ball.ply", *COMMON)
+    works(clf(*common, "--set", "coloring.by=solid", "-q"))
+    color = encode(np.array(load_scene(SCENE).material.color))
     assert np.abs(load("ball.ply").visual.vertex_colors[:, :3] / 255 - color).max() < 1 / 500
-    ended = shell(*common, "--set", "coloring.by=trap")
-    assert works(ended)
+    ended = works(clf(*common, "--set", "coloring.by=trap"))
     assert "coloring.by: trap cannot be computed for vertices; they get the material's colour\n" in ended.err
     assert np.abs(load("ball.ply").visual.vertex_colors[:, :3] / 255 - color).max() < 1 / 500
     # A palette over smooth counts, of which a sphere around a ball has one: all vertices get nearly the same.
     ends = "{at: 0, color: [0, 0, 0]}, {at: 1, color: [1, 0, 0]}"
     stops = f"coloring={{by: iterations, scale: 0.05, repeat: false, palette: [{ends}]}}"
-    assert works(shell(*common, "--set", stops, "--set", "renderer.value=coverage", "-q"))
+    works(clf(*common, "--set", stops, "--set", "renderer.value=coverage", "-q"))
     red = load("ball.ply").visual.vertex_colors[:, 0] / 255
     # One voxel out |z| is 1 + STEP, and grows to its square with each step until it is beyond the distance bailout.
-    count = np.log2(np.log(load_scene(BALL).chain.distance_bailout) / np.log(1 + STEP))
+    count = np.log2(np.log(load_scene(SCENE).chain.distance_bailout) / np.log(1 + STEP))
     assert np.median(red) == pytest.approx(float(encode(np.array([0.05 * count]))[0]), abs=0.03)
 
 
-def test_a_volume_of_others(shell: InProcess) -> None:
+def test_a_volume_of_others(clf: InProcess) -> None:
     x, y, z = np.moveaxis(middles(), -1, 0)
     depth = ((1 - np.sqrt(x * x + y * y + z * z)) * 1000).astype(np.int16)
     volume = Volume(depth, CORNER + STEP / 2, STEP * np.eye(3))
     write_volume("theirs.nrrd", volume)
-    assert works(shell("mesh", "theirs.nrrd", "-o", "theirs.stl", "--level", "200"))
+    works(clf("mesh", "theirs.nrrd", "-o", "theirs.stl", "--level", "200"))
     found: Any = trimesh.load("theirs.stl")
     assert found.is_watertight
     assert found.volume == pytest.approx(4 / 3 * np.pi * 0.8**3, rel=0.02)
-    ended = shell("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000")
-    assert works(ended)  # all of the box
-    assert shell("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000", "--no-close").status == 2
+    works(clf("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000"))
+    assert clf("mesh", "theirs.nrrd", "-o", "open.ply", "--level=-2000", "--no-close").status == 2
 
 
-def test_a_scene_that_shows_a_volume_of_others(shell: InProcess) -> None:
+def test_a_scene_that_shows_a_volume_of_others(clf: InProcess) -> None:
     """It is converted, and meshed, where the scene's box puts it; its axes are turned along those of space."""
     x, y, z = np.moveaxis(middles(), -1, 0)
     depth = ((1 - np.sqrt(x * x + y * y + z * z)) * 1000).astype(np.int16)
@@ -172,14 +158,13 @@ def test_a_scene_that_shows_a_volume_of_others(shell: InProcess) -> None:
     Path("theirs.yaml").write_text(
         "version: 1\nformula: {name: mandelbulb}\ncamera: {}\nrenderer: {type: volume, file: theirs.nrrd, level: 200}\n"
     )
-    assert works(shell("voxelize", "theirs.yaml", "-o", "along.npy"))
+    works(clf("voxelize", "theirs.yaml", "-o", "along.npy"))
     along = read_volume("along.npy")
     np.testing.assert_array_equal(along.values, depth)
     np.testing.assert_allclose(along.origin, CORNER + STEP / 2, atol=1e-12)
     np.testing.assert_allclose(along.directions, STEP * np.eye(3), atol=1e-12)
     assert SCENE_KEY not in along.texts
-    ended = shell("mesh", "theirs.yaml", "-o", "theirs.ply")
-    assert works(ended)
+    ended = works(clf("mesh", "theirs.yaml", "-o", "theirs.ply"))
     assert "theirs.yaml: 36 x 30 x 27 voxels, 58.3 kB, level 200\n" in ended.err
     found = load("theirs.ply")
     assert found.is_watertight
@@ -189,37 +174,37 @@ def test_a_scene_that_shows_a_volume_of_others(shell: InProcess) -> None:
     outward = points / np.linalg.norm(points, axis=1)[:, None]
     assert np.sum(np.asarray(found.vertex_normals) * outward, axis=1).min() > 0.99
     twice = ("--set", "renderer.box={center: [5, 0, 0], size: 6}")
-    assert works(shell("mesh", "theirs.yaml", "-o", "large.ply", "--level", "0", *twice, "-q"))
+    works(clf("mesh", "theirs.yaml", "-o", "large.ply", "--level", "0", *twice, "-q"))
     assert load("large.ply").volume == pytest.approx(8 * 4 / 3 * np.pi, rel=0.02)
-    told = shell("voxelize", "theirs.yaml", "-o", "no.nrrd", "--resolution", "20")
+    told = clf("voxelize", "theirs.yaml", "-o", "no.nrrd", "--resolution", "20")
     assert told.is_one_line(
         2, "--resolution: applies only to grids filled from a formula; the scene shows a file"
     )
-    told = shell("mesh", "theirs.yaml", "-o", "no.ply", "--level", "5000", "-q")
+    told = clf("mesh", "theirs.yaml", "-o", "no.ply", "--level", "5000", "-q")
     assert told.is_one_line(2, "theirs.yaml: has no surface at the level 5000: its values are from ")
 
 
-def test_the_level_of_the_scene(shell: InProcess) -> None:
+def test_the_level_of_the_scene(clf: InProcess) -> None:
     """Of smooth counts, which are log2(log R / log r) at the radius r; also in a volume that was made before."""
-    bailout = load_scene(BALL).chain.distance_bailout
+    bailout = load_scene(SCENE).chain.distance_bailout
     radius = bailout ** (2.0**-4.5)
     settings = ("--set", "renderer.value=iterations", "--set", "renderer.level=4.5", "-q")
     box = ("--resolution", "40", "--set", "renderer.box={size: 4}")
     for store in ("float", "byte"):
         more = (*box, *settings, "--set", f"renderer.store={store}")
-        assert works(shell("mesh", "ball.yaml", "-o", "level.ply", *more))
+        works(clf("mesh", "scene.yaml", "-o", "level.ply", *more))
         away = np.linalg.norm(load("level.ply").vertices, axis=1)
         assert np.abs(away - radius).max() < 0.02
-        assert works(shell("voxelize", "ball.yaml", "-o", "level.nrrd", *more))
-        assert works(shell("mesh", "level.nrrd", "-o", "again.ply", "-q"))
+        works(clf("voxelize", "scene.yaml", "-o", "level.nrrd", *more))
+        works(clf("mesh", "level.nrrd", "-o", "again.ply", "-q"))
         assert Path("again.ply").read_bytes() == Path("level.ply").read_bytes()
-    assert works(shell("mesh", "level.nrrd", "-o", "other.ply", "-q", "--level", "127.5"))
+    works(clf("mesh", "level.nrrd", "-o", "other.ply", "-q", "--level", "127.5"))
     assert len(load("other.ply").vertices) != len(load("level.ply").vertices)
 
 
-def test_what_the_box_cuts_keeps_its_flat_faces(shell: InProcess) -> None:
+def test_what_the_box_cuts_keeps_its_flat_faces(clf: InProcess) -> None:
     half = "renderer.box={center: [0, 0, 1], size: [2.5, 2.5, 2]}"
-    assert works(shell("mesh", "ball.yaml", "-o", "half.ply", "--resolution", "30", "--set", half, "-q"))
+    works(clf("mesh", "scene.yaml", "-o", "half.ply", "--resolution", "30", "--set", half, "-q"))
     mesh = load("half.ply")
     assert mesh.is_watertight
     assert mesh.volume == pytest.approx(2 / 3 * np.pi, rel=0.05)
@@ -227,8 +212,8 @@ def test_what_the_box_cuts_keeps_its_flat_faces(shell: InProcess) -> None:
     assert 100 < flat.sum() < len(flat)
     middle = flat & (np.linalg.norm(mesh.vertices, axis=1) < 0.8)
     assert np.allclose(mesh.vertex_normals[middle], (0, 0, -1))
-    assert works(
-        shell("mesh", "ball.yaml", "-o", "open.ply", "--resolution", "30", "--set", half, "--no-close", "-q")
+    works(
+        clf("mesh", "scene.yaml", "-o", "open.ply", "--resolution", "30", "--set", half, "--no-close", "-q")
     )
     assert not load("open.ply").is_watertight
 
@@ -241,30 +226,30 @@ DEEP = "renderer.zoom=[{center: [1.0, 0, 0], scale: 1.0e+7}]"
     ("arguments", "parts"),
     [
         (
-            ("mesh", "ball.yaml", "-o", "m.ply", "--resolution", "36", "--set", FAR, "-q"),
-            ("ball.yaml: nothing of the set lies in the box of 1 x 1 x 1 around [9, 0, 0], at 36 x 36 x 36 voxels",),
+            ("mesh", "scene.yaml", "-o", "m.ply", "--resolution", "36", "--set", FAR, "-q"),
+            ("scene.yaml: nothing of the set lies in the box of 1 x 1 x 1 around [9, 0, 0], at 36 x 36 x 36 voxels",),
         ),
-        (("mesh", "ball.yaml", "-o", "m.fbx"), ("unknown extension '.fbx'; known: .ply, .stl, .obj, .glb",)),
-        (("voxelize", "ball.yaml", "-o", "v.raw"), ("unknown extension '.raw'; known: .nrrd, .npy",)),
-        (("voxelize", "ball.yaml", "-o", "v.npy", "--gzip"), ("v.npy: cannot be compressed: NPY has no compression",)),
-        (("voxelize", "ball.yaml", "-o", "no/v.nrrd"), ("no/v.nrrd: cannot be written: there is no folder",)),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--resolution", "1"), ("--resolution: must be at least 2",)),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--resolution", "3,4"), ("--resolution: must be N or NX,NY,NZ",)),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--resolution", "99999"), ("--resolution: must be at most 16384",)),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--precision", "half"), ("--precision: ", "half")),
+        (("mesh", "scene.yaml", "-o", "m.fbx"), ("unknown extension '.fbx'; known: .ply, .stl, .obj, .glb",)),
+        (("voxelize", "scene.yaml", "-o", "v.raw"), ("unknown extension '.raw'; known: .nrrd, .npy",)),
+        (("voxelize", "scene.yaml", "-o", "v.npy", "--gzip"), ("v.npy: cannot be compressed: NPY has no compression",)),
+        (("voxelize", "scene.yaml", "-o", "no/v.nrrd"), ("no/v.nrrd: cannot be written: there is no folder",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--resolution", "1"), ("--resolution: must be at least 2",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--resolution", "3,4"), ("--resolution: must be N or NX,NY,NZ",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--resolution", "99999"), ("--resolution: must be at most 16384",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--precision", "half"), ("--precision: ", "half")),
         (
-            ("voxelize", "ball.yaml", "-o", "v.nrrd", "--resolution", "16384,16384,16384"),
+            ("voxelize", "scene.yaml", "-o", "v.nrrd", "--resolution", "16384,16384,16384"),
             ("--resolution: 16384 x 16384 x 16384 voxels need 4.4 TB of memory, ", " are left"),
         ),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--set", "renderer.box.size=0"), ("--set renderer.box.size: ",)),
-        (("voxelize", "ball.yaml", "-o", "v.nrrd", "--set", "renderer.type=surface"), ("must be volume here",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--set", "renderer.box.size=0"), ("--set renderer.box.size: ",)),
+        (("voxelize", "scene.yaml", "-o", "v.nrrd", "--set", "renderer.type=surface"), ("must be volume here",)),
         (
-            ("mesh", "ball.yaml", "-o", "m.ply", "--level", "1.5", *COMMON, "-q"),
+            ("mesh", "scene.yaml", "-o", "m.ply", "--level", "1.5", *COMMON, "-q"),
             ("--level: must be above 0 and at most 1, got 1.5",),
         ),
-        (("mesh", "ball.yaml", "-o", "m.ply", "--level", "nan"), ("--level: must be a number, got nan",)),
+        (("mesh", "scene.yaml", "-o", "m.ply", "--level", "nan"), ("--level: must be a number, got nan",)),
         (
-            ("mesh", "ball.yaml", "-o", "m.stl", "--resolution", "32", "--set", DEEP, "-q"),
+            ("mesh", "scene.yaml", "-o", "m.stl", "--resolution", "32", "--set", DEEP, "-q"),
             ("m.stl: cannot be written: its 32-bit",),
         ),
         (("mesh", "same.npy", "-o", "m.ply"), ("same.npy: has no surface: all its values are 3",)),
@@ -277,52 +262,41 @@ DEEP = "renderer.zoom=[{center: [1.0, 0, 0], scale: 1.0e+7}]"
         (("mesh", "short.nrrd", "-o", "m.ply"), ("short.nrrd: is cut short",)),
     ],
 )  # fmt: skip
-def test_mistakes_are_one_line(arguments: tuple[str, ...], parts: tuple[str, ...], shell: InProcess) -> None:
+def test_mistakes_are_one_line(arguments: tuple[str, ...], parts: tuple[str, ...], clf: InProcess) -> None:
     np.save("same.npy", np.full((3, 3, 3), 3.0))
     np.save("ramp.npy", np.arange(27).reshape(3, 3, 3))
     write_volume("short.nrrd", Volume(np.zeros((3, 3, 3))))
     Path("short.nrrd").write_bytes(Path("short.nrrd").read_bytes()[:-1])
     before = sorted(Path().iterdir())
-    assert shell(*arguments).is_one_line(2, *parts)
+    assert clf(*arguments).is_one_line(2, *parts)
     assert sorted(Path().iterdir()) == before
 
 
-def test_files_are_read_once(shell: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_files_are_read_once(clf: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The scene, and the grid of others that it shows: such a grid may have a gigabyte."""
     write_volume("theirs.nrrd", Volume(np.pad(np.ones((3, 3, 3)), 2)))
-    (tmp_path / "theirs.yaml").write_text(BALL + "renderer: {type: volume, file: theirs.nrrd}\n")
-    read: list[str] = []
-
-    def counted(module: Any, name: str) -> None:
-        original = getattr(module, name)
-
-        def call(*arguments: Any, **named: Any) -> Any:
-            read.append(name)
-            return original(*arguments, **named)
-
-        monkeypatch.setattr(module, name, call)
-
-    counted(load_module, "read_document")
-    counted(given, "read_grid")
-    assert works(shell("voxelize", "theirs.yaml", "-o", "copy.nrrd"))
-    assert sorted(read) == ["read_document", "read_grid"]
-    read.clear()
-    assert works(shell("mesh", "theirs.yaml", "-o", "copy.ply"))
-    assert sorted(read) == ["read_document", "read_grid"]
+    (tmp_path / "theirs.yaml").write_text(SCENE + "renderer: {type: volume, file: theirs.nrrd}\n")
+    scenes, grids = (
+        counted(monkeypatch, load_module, "read_document"),
+        counted(monkeypatch, given, "read_grid"),
+    )
+    works(clf("voxelize", "theirs.yaml", "-o", "copy.nrrd"))
+    assert (len(scenes), len(grids)) == (1, 1)
+    works(clf("mesh", "theirs.yaml", "-o", "copy.ply"))
+    assert (len(scenes), len(grids)) == (2, 2)
 
 
-def test_without_scikit_image(shell: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_scikit_image(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    told = shell("mesh", "ball.yaml", "-o", "m.ply")
+    told = clf("mesh", "scene.yaml", "-o", "m.ply")
     assert told.is_one_line(2, "clfractal mesh: needs scikit-image: pip install scikit-image")
 
 
-def test_a_scene_in_a_volume_that_does_not_load(shell: InProcess) -> None:
+def test_a_scene_in_a_volume_that_does_not_load(clf: InProcess) -> None:
     """Somebody's file must not stop the mesh: it only knows less."""
     values = np.pad(np.ones((3, 3, 3)), 2)
     write_volume("odd.nrrd", Volume(values, texts={SCENE_KEY: "version: 7\n"}))
-    ended = shell("mesh", "odd.nrrd", "-o", "odd.ply")
-    assert works(ended)
+    ended = works(clf("mesh", "odd.nrrd", "-o", "odd.ply"))
     assert "odd.nrrd: its scene cannot be used, so normals come from the values: " in ended.err
     assert load("odd.ply").is_watertight
 
@@ -344,17 +318,14 @@ def test_what_is_told_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
     assert told == ["triangles:  25%"]
 
 
+@pytest.mark.usefixtures("interrupts_are_not_ignored")
 @pytest.mark.parametrize("name", ["big.nrrd", "big.ply"])
 def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
     """In the middle of the work, at once."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    try:
-        (tmp_path / "ball.yaml").write_text(BALL)
-        side = "600" if name.endswith("nrrd") else "700"
-        run = command(
-            "voxelize" if name.endswith("nrrd") else "mesh", "ball.yaml", "-o", name, "--resolution", side
-        )
-        running = subprocess.Popen(run, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True)
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    kind, side = ("voxelize", "600") if name.endswith("nrrd") else ("mesh", "700")
+    run = command(kind, "scene.yaml", "-o", name, "--resolution", side)
+    with subprocess.Popen(run, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as running:
         assert running.stderr is not None
         assert "voxels need" in running.stderr.readline()
         time.sleep(0.5)
@@ -362,13 +333,9 @@ def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
         running.send_signal(signal.SIGINT)
         told = running.communicate(timeout=60)[1]
         assert time.monotonic() - start < 1.5
-    finally:
-        signal.signal(signal.SIGINT, before)
-    if running.returncode == 0:
-        pytest.fail(f"was done before it was interrupted: {told}")
-    assert running.returncode == 130
+    assert running.returncode == 130, told  # 0: it was done before it was interrupted
     assert told.splitlines()[-1] == f"{name}: interrupted, nothing was written"
-    assert [path.name for path in tmp_path.iterdir()] == ["ball.yaml"]
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.yaml"]
 
 
 def test_meshes_need_no_opencl_until_the_input_is_right() -> None:

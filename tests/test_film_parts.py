@@ -15,7 +15,7 @@ import clfractal
 from clfractal.cli.film_parts import frames_of, ranges, shown_ranges
 from clfractal.cli.film_sheet import MOST_FRAMES, spread
 from clfractal.files.whole import is_whole
-from tests.shell import InProcess
+from tests.shell import InProcess, works
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 4}
@@ -80,8 +80,7 @@ def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:
     assert clf(*listed).out.split() == ["0", "2-5"]
     assert clf(*listed, "--frames", "1-2").out.split() == ["2"]
     before = os.stat("f_01.exr").st_mtime_ns
-    ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--resume")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--resume"))
     assert "5 frames, 1 were there already" in ended.err
     assert os.stat("f_01.exr").st_mtime_ns == before
     listed_at_last = clf(*listed)
@@ -92,7 +91,7 @@ def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:
 def test_a_frame_of_random_bytes_is_missing_and_told(clf: InProcess, name: str) -> None:
     """As a failing disk or a copy that went wrong leaves it. It may be somebody's file: so it is not written over."""
     order = ("animate", "scene.yaml", "-o", f"f_#{Path(name).suffix}", "--frames", "0-2")
-    assert clf(*order).status == 0
+    works(clf(*order))
     noise = np.random.default_rng(1).bytes(5000)
     Path(name).write_bytes(noise)
     assert clf(*order, "--missing").out.split() == ["1"]
@@ -101,7 +100,7 @@ def test_a_frame_of_random_bytes_is_missing_and_told(clf: InProcess, name: str) 
     assert Path(name).read_bytes() == noise
     Path(name).write_bytes(bytes(5000))  # as a power failure leaves it
     assert clf(*order, "--missing").out.split() == ["1"]
-    assert clf(*order, "--resume").status == 0
+    works(clf(*order, "--resume"))
     assert clf(*order, "--missing").out == ""
 
 
@@ -112,7 +111,7 @@ def test_what_is_no_frame_is_told_before_any_is_rendered(clf: InProcess) -> None
 
 
 def test_a_damaged_frame_is_told_with_advice(clf: InProcess) -> None:
-    assert clf("animate", "scene.yaml", "-o", "p_#.png", "--frames", "0").status == 0
+    works(clf("animate", "scene.yaml", "-o", "p_#.png", "--frames", "0"))
     data = bytearray(Path("p_0.png").read_bytes())
     at = data.index(b"clfractal")
     data[at + 3] ^= 8
@@ -133,8 +132,7 @@ def test_the_missing_of_a_film_or_of_no_pattern(clf: InProcess) -> None:
 
 
 def test_a_sheet_of_small_frames(clf: InProcess) -> None:
-    ended = clf("animate", "scene.yaml", "--preview", "sheet.png", "--frames", "0-5:2")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "scene.yaml", "--preview", "sheet.png", "--frames", "0-5:2"))
     assert ended.err.splitlines()[-1].startswith("sheet.png: 3 of 6 frames, ")
     with Image.open("sheet.png") as sheet:
         pixels = np.asarray(sheet, float)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import builtins
+import sys
 from fractions import Fraction
 from pathlib import Path
 from typing import Any
@@ -14,10 +14,11 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, FileError
 from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, Recipe
 from clfractal.files.moving import plan_film, write_film, ycbcr
-from tests.shell import InProcess
+from clfractal.files.png import read_form, write_png
+from tests.shell import InProcess, works
 
 SIZE = (128, 96)
 COLORS = [
@@ -142,8 +143,7 @@ def test_a_film_from_the_shell(clf: InProcess) -> None:
         "animate", "scene.yaml", "-o", "film.mkv", "-o", "f#.png", "-o", "film.mp4", "--chroma", "rgb"
     )
     assert ended.is_one_line(2, "--chroma: does not fit: h264 has 420 with 8 bits")
-    ended = clf("animate", "scene.yaml", "-o", "film.mkv", "-o", "f#.png", "-o", "film.mp4")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "scene.yaml", "-o", "film.mkv", "-o", "f#.png", "-o", "film.mp4"))
     assert ended.err.splitlines()[-1].startswith("f0.png to f3.png, film.mkv, film.mp4: 4 frames, ")
     assert sorted(path.name for path in Path().iterdir()) == [
         *(f"f{i}.png" for i in range(4)),
@@ -159,11 +159,19 @@ def test_a_film_from_the_shell(clf: InProcess) -> None:
         np.testing.assert_array_equal(np.asarray(Image.open(f"f{number}.png")), shown)
 
 
-def test_a_film_that_was_interrupted_goes_on(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr("clfractal.files.moving._frame", _interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            clf("animate", "scene.yaml", "-o", "film.mov")
+def interrupted(clf: InProcess, *options: str) -> None:
+    """All frames are made, and the film is not."""
+
+    def interrupt(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+        patch.setattr("clfractal.files.moving._frame", interrupt)
+        clf("animate", "scene.yaml", *options)
+
+
+def test_a_film_that_was_interrupted_goes_on(clf: InProcess) -> None:
+    interrupted(clf, "-o", "film.mov")
     assert sorted(path.name for path in Path("film.mov.partial").iterdir()) == [
         f"00000{i}.png" for i in range(4)
     ]
@@ -180,12 +188,8 @@ def test_a_film_that_was_interrupted_goes_on(clf: InProcess, monkeypatch: pytest
     assert clf("animate", "scene.yaml", "-o", "film.mov").status == 2
     assert Path("film.mov.partial/000000.png").exists()
     Path("film.mov.partial/mine.txt").unlink()
-    assert clf("animate", "scene.yaml", "-o", "film.mov").status == 0
+    works(clf("animate", "scene.yaml", "-o", "film.mov"))
     assert not Path("film.mov.partial").exists()
-
-
-def _interrupt(*_: object) -> None:
-    raise KeyboardInterrupt
 
 
 def test_a_film_of_8_bits_is_the_same_beside_others(clf: InProcess) -> None:
@@ -197,10 +201,10 @@ camera: {position: [0, -3, 0.5]}
 animation: {frames: 2, tracks: {camera.position.0: {expression: u}}}
 """
     Path("dim.yaml").write_text(scene)
-    assert clf("animate", "dim.yaml", "-o", "alone.mkv", "-o", "p_#.png").status == 0
+    works(clf("animate", "dim.yaml", "-o", "alone.mkv", "-o", "p_#.png"))
     for others in (["a.mov"], ["b.mov", "c.mp4"]):
         order = ["animate", "dim.yaml", *(part for name in ("beside.mkv", *others) for part in ("-o", name))]
-        assert clf(*order).status == 0
+        works(clf(*order))
         assert not Path("beside.mkv.partial").exists()
         pairs = zip(decoded(Path("alone.mkv"))[0], decoded(Path("beside.mkv"))[0], strict=True)
         for number, (one, other) in enumerate(pairs):
@@ -211,7 +215,7 @@ animation: {frames: 2, tracks: {camera.position.0: {expression: u}}}
     # A film that is interrupted between its kinds of frames goes on.
     Path("beside.mkv.partial").mkdir()
     Path("beside.mkv.partial/000001.8.png").write_bytes(Path("p_1.png").read_bytes()[:100])
-    assert clf("animate", "dim.yaml", "-o", "beside.mkv", "-o", "a.mov", "--resume").status == 0
+    works(clf("animate", "dim.yaml", "-o", "beside.mkv", "-o", "a.mov", "--resume"))
 
 
 REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
@@ -254,15 +258,11 @@ def test_kept_frames_stay_where_an_order_is_wrong(clf: InProcess) -> None:
     assert kept.exists()
 
 
-def test_a_film_leaves_other_pictures_as_they_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
-) -> None:
-    monkeypatch.chdir(tmp_path)
+def test_a_film_leaves_other_pictures_as_they_are(clf: InProcess) -> None:
     Path("scene.yaml").write_text(SCENE + "output: {png_bits: 16}\n")
-    clf = InProcess(capfd)
-    assert clf("animate", "scene.yaml", "-o", "a#.png").status == 0
+    works(clf("animate", "scene.yaml", "-o", "a#.png"))
     before = {path.name: path.read_bytes() for path in Path().glob("a*.png")}
-    assert clf("animate", "scene.yaml", "-o", "a#.png", "-o", "film.mkv").status == 0
+    works(clf("animate", "scene.yaml", "-o", "a#.png", "-o", "film.mkv"))
     after = {path.name: path.read_bytes() for path in Path().glob("a*.png")}
     # All but the seconds in their headers.
     for name, data in after.items():
@@ -271,12 +271,9 @@ def test_a_film_leaves_other_pictures_as_they_are(
     assert clf("animate", "scene.yaml", "-o", "a#.png", "--resume").err.endswith("were there already\n")
 
 
-def test_frames_of_another_part_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    with monkeypatch.context() as patch:
-        patch.setattr("clfractal.files.moving._frame", _interrupt)
-        with pytest.raises(KeyboardInterrupt):
-            clf("animate", "scene.yaml", "-o", "film.mkv", "--frames", "0-1")
-    assert clf("animate", "scene.yaml", "-o", "film.mkv", "--frames", "2-3", "--resume").status == 0
+def test_frames_of_another_part_stay(clf: InProcess) -> None:
+    interrupted(clf, "-o", "film.mkv", "--frames", "0-1")
+    works(clf("animate", "scene.yaml", "-o", "film.mkv", "--frames", "2-3", "--resume"))
     assert len(decoded(Path("film.mkv"))[0]) == 2
     assert sorted(path.name for path in Path("film.mkv.partial").iterdir()) == ["000000.png", "000001.png"]
 
@@ -288,14 +285,7 @@ def test_two_pictures_are_no_film(mode: str, tmp_path: Path) -> None:
 
 
 def test_without_the_package_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    usual = builtins.__import__
-
-    def without(name: str, *arguments: Any, **others: Any) -> Any:
-        if name == "av":
-            raise ImportError(name)
-        return usual(name, *arguments, **others)
-
-    monkeypatch.setattr(builtins, "__import__", without)
+    monkeypatch.setitem(sys.modules, "av", None)
     with pytest.raises(ClfractalError, match=r"needs the package av: pip install 'clfractal\[film\]'"):
         plan_film(tmp_path / "a.mp4", Recipe(), SIZE, 25)
 
@@ -321,3 +311,70 @@ def test_a_picture_that_cannot_be_read_makes_no_film(pictures: list[Path], tmp_p
         write_film(plan_film(path, Recipe(), SIZE, 25), pictures)
     assert path.read_bytes() == b"before"
     assert sorted(each.name for each in tmp_path.iterdir()) == [*(f"{i}.png" for i in range(6)), "film.mp4"]
+
+
+# --- frames that are stored as the film needs them ---
+
+
+def levels(path: Path) -> set[int]:
+    """The codes of a film of 16 bits, in its first picture."""
+    with av.open(str(path)) as file:
+        frame = next(file.decode(video=0))
+    assert frame.format.name == "gbrp16le"
+    return set(np.frombuffer(bytes(frame.planes[0]), "<u2").tolist())
+
+
+def test_frames_of_fewer_bits_are_made_again(clf: InProcess) -> None:
+    interrupted(clf, "-o", "film.mkv")
+    kept = sorted(Path("film.mkv.partial").iterdir())
+    assert [read_form(path) for path in kept] == [(8, 3)] * 4
+    ended = works(clf("animate", "scene.yaml", "-o", "film.mkv", "--bits", "16", "--resume"))
+    assert "film.mkv: 4 frames, " in ended.err
+    assert "there already" not in ended.err
+    resumed = levels(Path("film.mkv"))
+    assert any(code % 257 for code in resumed)  # more than 8 bits can tell
+    Path("film.mkv").unlink()
+    works(clf("animate", "scene.yaml", "-o", "film.mkv", "--bits", "16"))
+    assert levels(Path("film.mkv")) == resumed
+
+
+def test_frames_of_more_bits_too_and_those_that_fit_stay(clf: InProcess) -> None:
+    """So a film has the same bits as one that was never interrupted: those of 8 bits are dithered."""
+    interrupted(clf, "-o", "film.mkv", "--bits", "16")
+    assert (
+        "all 4 frames were there"
+        in clf("animate", "scene.yaml", "-o", "film.mkv", "--bits", "16", "--resume").err
+    )
+    interrupted(clf, "-o", "film.mkv", "--bits", "16")
+    ended = clf("animate", "scene.yaml", "-o", "film.mkv", "--resume")
+    assert "there already" not in ended.err
+    resumed = Path("film.mkv").read_bytes()
+    Path("film.mkv").unlink()
+    works(clf("animate", "scene.yaml", "-o", "film.mkv"))
+    with av.open("film.mkv") as file:
+        assert next(file.decode(video=0)).format.name == "bgr0"
+    assert len(Path("film.mkv").read_bytes()) == len(resumed)
+
+
+def test_a_numbered_picture_that_was_converted_is_made_again(clf: InProcess) -> None:
+    works(clf("animate", "scene.yaml", "-o", "f#.png"))
+    first = Path("f1.png")
+    whole = first.read_bytes()
+    with Image.open(first) as picture:
+        scene = picture.text["clfractal"]  # type: ignore[attr-defined]
+        light = (np.asarray(picture.convert("RGBA")) / np.float32(255)).astype(np.float32)
+    write_png(first, [light], width=64, height=48, alpha=True, texts={"clfractal": scene})
+    assert read_form(first) == (8, 4)
+    ended = clf("animate", "scene.yaml", "-o", "f#.png", "--resume")
+    assert "1 frames, 3 were there already" in ended.err
+    assert read_form(first) == (8, 3)
+    assert abs(len(first.read_bytes()) - len(whole)) < 50
+
+
+def test_the_form_of_a_picture(tmp_path: Path) -> None:
+    for mode, form in {"L": (8, 1), "LA": (8, 2), "RGB": (8, 3), "RGBA": (8, 4), "I;16": (16, 1)}.items():
+        Image.new(mode, (3, 2)).save(tmp_path / "a.png")
+        assert read_form(tmp_path / "a.png") == form
+    (tmp_path / "b.png").write_bytes(b"\x89PNG\r\n\x1a\n")
+    with pytest.raises(FileError, match="is not a PNG file"):
+        read_form(tmp_path / "b.png")

@@ -19,11 +19,6 @@ from clfractal.images.modes import PICKED
 from tests.shell import SCENE, Ended, InProcess
 
 
-@pytest.fixture
-def shell(here: Path, capsys: pytest.CaptureFixture[str]) -> InProcess:
-    return InProcess(capsys)
-
-
 def pixels(path: str | Path) -> npt.NDArray[np.uint8]:
     with Image.open(path) as image:
         return np.asarray(image)
@@ -33,11 +28,11 @@ def test_every_extension_has_a_format() -> None:
     assert tuple(KINDS) == PICTURES
 
 
-def test_all_formats_of_one_render(here: Path, shell: InProcess) -> None:
+def test_all_formats_of_one_render(here: Path, clf: InProcess) -> None:
     """The scene is in each, and renders to the same pixels again."""
     names = ["a.png", "a.jpg", "b.jpeg", "a.webp", "a.exr"]
     outputs = [part for name in names for part in ("-o", name)]
-    ended = shell(
+    ended = clf(
         "render", "scene.yaml", *outputs, "--quiet", "--set", "output.tone=agx", "--set", "output.quality=100"
     )
     assert ended == Ended(0, "", "")
@@ -48,9 +43,9 @@ def test_all_formats_of_one_render(here: Path, shell: InProcess) -> None:
     exr = read_exr("a.exr")[0]["R"]
     for name in names:
         assert clfractal.load_scene(here / name).output.tone == "agx"
-    assert shell("render", "a.jpg", "-o", "again.exr", "--quiet").status == 0
+    assert clf("render", "a.jpg", "-o", "again.exr", "--quiet").status == 0
     np.testing.assert_array_equal(read_exr("again.exr")[0]["R"], exr)
-    assert shell("check", "a.webp").out == shell("check", "a.exr").out
+    assert clf("check", "a.webp").out == clf("check", "a.exr").out
     assert sorted(entry.name for entry in here.iterdir()) == sorted([*names, "again.exr", "scene.yaml"])
 
 
@@ -67,47 +62,47 @@ def test_all_formats_of_one_render(here: Path, shell: InProcess) -> None:
     ],
 )  # fmt: skip
 def test_what_a_format_cannot_hold_is_refused(
-    shell: InProcess, here: Path, name: str, changes: list[str], message: str
+    clf: InProcess, here: Path, name: str, changes: list[str], message: str
 ) -> None:
     """Before anything is rendered, and beside an output that could be written."""
     options = [part for change in changes for part in ("--set", change)]
-    ended = shell("render", "scene.yaml", "-o", "good.exr", "-o", name, *options)
+    ended = clf("render", "scene.yaml", "-o", "good.exr", "-o", name, *options)
     assert ended.is_one_line(2, f"{name}: {message}")
     assert [entry.name for entry in here.iterdir()] == ["scene.yaml"]
 
 
 @pytest.mark.parametrize("mode", PICKED)
-def test_formats_that_mix_pixels_do_not_interlace_eyes(shell: InProcess, mode: str) -> None:
+def test_formats_that_mix_pixels_do_not_interlace_eyes(clf: InProcess, mode: str) -> None:
     stereo = ("--set", f"stereo.mode={mode}")
     told = f"mixes neighbouring pixels, which {mode} gives to different eyes; write a PNG"
-    assert shell("render", "scene.yaml", "-o", "x.jpg", *stereo).is_one_line(2, f"x.jpg: a JPEG {told}\n")
-    ended = shell("render", "scene.yaml", "-o", "x.webp", *stereo)
+    assert clf("render", "scene.yaml", "-o", "x.jpg", *stereo).is_one_line(2, f"x.jpg: a JPEG {told}\n")
+    ended = clf("render", "scene.yaml", "-o", "x.webp", *stereo)
     assert ended.is_one_line(2, f"x.webp: a WebP {told}, or set output.quality to 100\n")
     lossless = (*stereo, "--set", "output.quality=100", "--quiet")
-    assert shell("render", "scene.yaml", "-o", "x.webp", "-o", "x.png", *lossless) == Ended(0, "", "")
+    assert clf("render", "scene.yaml", "-o", "x.webp", "-o", "x.png", *lossless) == Ended(0, "", "")
     np.testing.assert_array_equal(pixels("x.webp"), pixels("x.png"))
 
 
-def test_modes_and_parts_that_fit(shell: InProcess) -> None:
+def test_modes_and_parts_that_fit(clf: InProcess) -> None:
     """A region is what a file holds; a pair is two files."""
     wide = ("--set", "image={width: 20000, height: 40}", "--region", "10000,0,40,32")
-    assert shell("render", "scene.yaml", "-o", "part.webp", *wide, "--quiet") == Ended(0, "", "")
+    assert clf("render", "scene.yaml", "-o", "part.webp", *wide, "--quiet") == Ended(0, "", "")
     assert pixels("part.webp").shape == (32, 40, 3)
     pair = ("--set", "stereo.mode=multi_view", "--quiet")
-    assert shell("render", "scene.yaml", "-o", "eyes.jpg", *pair) == Ended(0, "", "")
+    assert clf("render", "scene.yaml", "-o", "eyes.jpg", *pair) == Ended(0, "", "")
     assert pixels("eyes_L.jpg").shape == pixels("eyes_R.jpg").shape == (36, 40, 3)
 
 
-def test_a_webp_is_transparent(shell: InProcess) -> None:
+def test_a_webp_is_transparent(clf: InProcess) -> None:
     clear = ("--set", "background=transparent", "--set", "output.quality=100", "--quiet")
-    assert shell("render", "scene.yaml", "-o", "a.webp", "-o", "a.png", *clear) == Ended(0, "", "")
+    assert clf("render", "scene.yaml", "-o", "a.webp", "-o", "a.png", *clear) == Ended(0, "", "")
     assert pixels("a.png").shape[2] == 4
     np.testing.assert_array_equal(pixels("a.webp"), pixels("a.png"))
 
 
 @pytest.mark.parametrize("value", ["0", "101", "2.5", "high"])
-def test_a_wrong_quality(shell: InProcess, value: str) -> None:
-    ended = shell("render", "scene.yaml", "-o", "x.jpg", "--set", f"output.quality={value}")
+def test_a_wrong_quality(clf: InProcess, value: str) -> None:
+    ended = clf("render", "scene.yaml", "-o", "x.jpg", "--set", f"output.quality={value}")
     assert ended.is_one_line(2, "--set output.quality: ")
 
 
@@ -131,9 +126,9 @@ def test_films_are_saved(here: Path) -> None:
     assert not (here / "x.jpg").exists()
 
 
-def test_slices_are_checked_too(shell: InProcess) -> None:
+def test_slices_are_checked_too(clf: InProcess) -> None:
     cut = ("--set", "renderer={type: cut_plane}", "--count", "2")
-    ended = shell("slices", "scene.yaml", "-o", "s.jpg", *cut, "--set", "background=transparent")
+    ended = clf("slices", "scene.yaml", "-o", "s.jpg", *cut, "--set", "background=transparent")
     assert ended.is_one_line(2, "s_0001.jpg: a JPEG has no transparency")
-    assert shell("slices", "scene.yaml", "-o", "s.webp", *cut, "--quiet") == Ended(0, "", "")
+    assert clf("slices", "scene.yaml", "-o", "s.webp", *cut, "--quiet") == Ended(0, "", "")
     assert pixels("s_0002.webp").shape == (36, 40, 3)

@@ -14,7 +14,7 @@ from numpy.linalg import norm
 import clfractal
 from clfractal.device.select import choose, has_float64
 from clfractal.files.volume_file import SCENE_KEY, read_volume
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, works
 
 # z stays where it is: the set is the ball of the bailout's radius, 0.8 around the origin.
 BALL = {
@@ -118,8 +118,7 @@ def test_grids_that_hold_little_are_told(
     assert all(line.startswith(remark) for line in found)
     (tmp_path / "ball.yaml").write_text(clfractal.dump_scene(scene))
     shell = InProcess(capsys)
-    ended = shell("voxelize", tmp_path / "ball.yaml", "-o", tmp_path / "a.nrrd")
-    assert ended.status == 0
+    ended = works(shell("voxelize", tmp_path / "ball.yaml", "-o", tmp_path / "a.nrrd"))
     assert [line for line in ended.err.splitlines() if f"ball.yaml: {remark}" in line] or not remark
     assert ("inside the set" in ended.err or "the volume" in ended.err) == bool(remark)
     pytest.importorskip("skimage")
@@ -140,8 +139,7 @@ def test_a_grid_of_nothing_but_nan_is_told(tmp_path: Path, capsys: pytest.Captur
     assert clfractal.voxelize(scene).remarks == (remark,)
     (tmp_path / "lost.yaml").write_text(clfractal.dump_scene(scene))
     shell = InProcess(capsys)
-    ended = shell("voxelize", tmp_path / "lost.yaml", "-o", tmp_path / "a.nrrd")
-    assert ended.status == 0
+    ended = works(shell("voxelize", tmp_path / "lost.yaml", "-o", tmp_path / "a.nrrd"))
     assert f"lost.yaml: {remark}" in ended.err
     for source in ("lost.yaml", "lost.npy"):
         ended = shell("mesh", tmp_path / source, "-o", tmp_path / "a.ply")

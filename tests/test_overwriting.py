@@ -26,8 +26,9 @@ VOLUME = SCENE + "renderer: {type: volume, file: scan.nrrd}\n"
 PLANE = SCENE + "renderer: {type: cut_plane, plane: {width: 3, height: 3}}\n"
 
 
-def _write(here: Path) -> None:
-    (here / "scene.yaml").write_text(SCENE)
+@pytest.fixture(autouse=True)
+def _files(here: Path) -> None:
+    """Scenes of every kind, and the files that they name."""
     shutil.copy(resources.folder("formulas/library") / "mandelbulb.yaml", here / "own.yaml")
     (here / "formula.yaml").write_text(SCENE.replace("name: mandelbulb", "file: own.yaml"))
     rows = {name: np.ones((4, 8), np.float32) for name in "RGB"}
@@ -66,19 +67,6 @@ def _write(here: Path) -> None:
     (here / "deep").symlink_to(".")
     (here / "folder").mkdir()
     os.link(here / "sky.exr", here / "hard.exr")
-
-
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """The current folder, with scenes of every kind and the files that they name."""
-    monkeypatch.chdir(tmp_path)
-    _write(tmp_path)
-    return tmp_path
-
-
-@pytest.fixture
-def clf(capsys: pytest.CaptureFixture[str]) -> InProcess:
-    return InProcess(capsys)
 
 
 def contents(here: Path) -> dict[str, bytes]:

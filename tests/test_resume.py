@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import random
+import re
 import signal
 import subprocess
 import time
@@ -20,11 +21,12 @@ from clfractal.cli.shell import Shell
 from clfractal.cli.unfinished import Unfinished, continued
 from clfractal.device.select import choose
 from clfractal.engine.prepare import prepare
+from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes
 from tests.long_renders import HEAVY, TILES
-from tests.shell import SCENE, Ended, command, environment, process
+from tests.shell import SCENE, Ended, command, environment, process, works
 from tests.variants import one_of
 
 
@@ -162,8 +164,7 @@ def test_work_goes_on_with_the_lanes_that_it_began_with(tmp_path: Path) -> None:
 
 def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:
     interrupted(tmp_path)
-    ended = process(["render", "scene.yaml", "-o", "a.png"], tmp_path)
-    assert ended.status == 0
+    ended = works(process(["render", "scene.yaml", "-o", "a.png"], tmp_path))
     assert ended.err.splitlines()[0].startswith("a.png.partial: earlier work is discarded")
     assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "a.png"}
 
@@ -184,3 +185,95 @@ def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
     finally:
         running.send_signal(signal.SIGCONT)
         assert running.wait() == 0
+
+
+# --- both eyes ---
+
+
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
+
+# (The program of the other file of this kind: its text does not depend on the picture's size.)
+PAIR = HEAVY.replace("width: 224, height: 160", "width: 128, height: 96") + "stereo: {separation: 0.3}\n"
+PAIR_TILES = 2 * 4 * 3
+LEFT, RIGHT = "out.exr.partial", "out.exr.right.partial"
+
+
+# The program, with a pause after each tile that it has stored: so there is time to stop it between two, however many
+# tiles the device renders at once.
+SLOWLY = """
+import sys, time
+from clfractal.cli import main
+from clfractal.images.store import JournalFramebuffer
+put = JournalFramebuffer.put
+def slowly(*arguments):
+    put(*arguments)
+    time.sleep(0.03)
+JournalFramebuffer.put = slowly
+sys.argv = ["clfractal", "render", "heavy.yaml", "-o", "out.exr", "--quiet"]
+main()
+"""
+
+
+@pytest.fixture(scope="module")
+def undisturbed_pair(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The channels of a finished render."""
+    folder = tmp_path_factory.mktemp("undisturbed_pair")
+    (folder / "heavy.yaml").write_text(PAIR)
+    assert render(folder, "--quiet") == Ended(0, "", "")
+    assert {path.name for path in folder.iterdir()} == {"heavy.yaml", "out.exr"}
+    return planes(folder / "out.exr")
+
+
+def stopped(folder: Path, number: signal.Signals, side: str) -> tuple[int, str]:
+    """A render that gets a signal as soon as some of an eye's tiles are on the disk: status, and standard error."""
+    (folder / "heavy.yaml").write_text(PAIR)
+    running = subprocess.Popen(
+        [command()[0], "-P", "-c", SLOWLY],
+        cwd=folder,
+        env=environment(),
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    record = 8 * 32 * 32 * 4
+    while running.poll() is None:
+        if (folder / side).exists() and (folder / side).stat().st_size > record:
+            running.send_signal(number)
+            break
+        time.sleep(0.001)
+    _, told = running.communicate(timeout=60)
+    return running.returncode, told
+
+
+@pytest.mark.parametrize("side", [LEFT, RIGHT])
+def test_killed_and_resumed(tmp_path: Path, undisturbed_pair: dict[str, bytes], side: str) -> None:
+    assert stopped(tmp_path, signal.SIGKILL, side) == (-signal.SIGKILL, "")
+    assert {path.name for path in tmp_path.iterdir()} == {"heavy.yaml", LEFT, RIGHT}
+    assert render(tmp_path, "--resume", "--stats", "stats.json", "--quiet") == Ended(0, "", "")
+    told = json.loads((tmp_path / "stats.json").read_text())
+    assert told["tiles"] == PAIR_TILES
+    assert (1 if side == LEFT else PAIR_TILES // 2 + 1) <= told["tiles_resumed"] < PAIR_TILES
+    assert told["rays"] == (PAIR_TILES - told["tiles_resumed"]) * 32 * 32 * 16
+    assert planes(tmp_path / "out.exr") == undisturbed_pair
+    assert {path.name for path in tmp_path.iterdir()} == {"heavy.yaml", "out.exr", "stats.json"}
+
+
+def test_interrupted_and_shown_in_another_way(tmp_path: Path, undisturbed_pair: dict[str, bytes]) -> None:
+    """Ctrl-C is told in one line. How the pair is shown is free to change: the eyes' pictures stay the same."""
+    status, told = stopped(tmp_path, signal.SIGINT, RIGHT)
+    assert status == 130
+    found = re.fullmatch(
+        rf"{re.escape(LEFT)}: interrupted with (\d+) of {PAIR_TILES} tiles done; --resume continues\n", told
+    )
+    assert found, told
+    assert {path.name for path in tmp_path.iterdir()} == {"heavy.yaml", LEFT, RIGHT}
+    options = ("--resume", "--stats", "stats.json", "--quiet", "--set", "stereo.mode=multi_view")
+    assert render(tmp_path, *options) == Ended(0, "", "")
+    resumed = json.loads((tmp_path / "stats.json").read_text())["tiles_resumed"]
+    assert int(found[1]) <= resumed < PAIR_TILES
+    views = read_exr(tmp_path / "out.exr")[0]
+    assert len(views) == 2 * len(undisturbed_pair)
+    assert {path.name for path in tmp_path.iterdir()} == {"heavy.yaml", "out.exr", "stats.json"}
+    # The same as both halves of the split picture.
+    for name, right in (("R", "right.R"), ("Z", "right.Z"), ("N.left.X", "N.right.X")):
+        beside = np.concatenate([views[name], views[right]], axis=1)
+        assert beside.tobytes() == undisturbed_pair[name.replace("left.", "")]

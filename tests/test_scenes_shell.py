@@ -22,7 +22,7 @@ from clfractal.errors import SceneError
 from clfractal.files.png import read_png_pixels
 from clfractal.files.watching import Watched
 from clfractal.scene.load import load_scene
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, works
 
 # --- scenes ---
 
@@ -72,8 +72,7 @@ def test_a_sheet_goes_on_where_it_was_interrupted(
         clf("scenes", "--sheet", "sheet.png")
     assert not Path("sheet.png").exists()
     assert len(kept) == 2
-    ended = clf("scenes", "--sheet", "sheet.png")
-    assert ended.status == 0, ended
+    ended = works(clf("scenes", "--sheet", "sheet.png"))
     assert "s3: 3 of 3" in ended.err
     assert "s1: " not in ended.err
     sheet = read_png_pixels("sheet.png")
@@ -92,8 +91,7 @@ def test_a_sheet_goes_on_where_it_was_interrupted(
 
 
 def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
-    ended = clf("new", "first", "--formula", "mandelbulb")
-    assert ended.status == 0, ended
+    ended = works(clf("new", "first", "--formula", "mandelbulb"))
     assert ended.out == ""
     text = Path("first.yaml").read_text("utf-8")
     assert text.startswith("# First\n")
@@ -115,8 +113,7 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
 @pytest.mark.parametrize("formula", ["apollonian", "kaliset"])
 def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess, formula: str) -> None:
     """Elsewhere one sees but the ball in which it was cut off."""
-    ended = clf("new", "hall", "--formula", formula)
-    assert ended.status == 0, ended
+    works(clf("new", "hall", "--formula", formula))
     scene = load_scene(Path("hall.yaml"))
     center, radius = scene.bounds
     assert np.linalg.norm(np.subtract(scene.camera.position, center)) < 0.7 * radius
@@ -286,19 +283,20 @@ def test_presets_of_other_renderers_and_of_views() -> None:
 
 
 def test_explicit_options_win(clf: InProcess) -> None:
-    ended = clf(
-        "render",
-        "scene.yaml",
-        "-o",
-        "out.png",
-        "--quality",
-        "good",
-        "--set",
-        "renderer.noise=0.3",
-        "--samples",
-        "2",
+    works(
+        clf(
+            "render",
+            "scene.yaml",
+            "-o",
+            "out.png",
+            "--quality",
+            "good",
+            "--set",
+            "renderer.noise=0.3",
+            "--samples",
+            "2",
+        )
     )
-    assert ended.status == 0, ended
     renderer = load_scene(Path("out.png")).surface
     assert (renderer.samples, renderer.noise) == (2, 0.3)
     film = clfractal.render(SCENE, samples=2, quality="good", channels=["R", "G", "B"])

@@ -10,7 +10,7 @@ import pytest
 from clfractal.api import load_scene
 from clfractal.files.exr import read_exr
 from clfractal.scene.parts import Image
-from tests.shell import InProcess
+from tests.shell import InProcess, works
 
 SCENE = """
 version: 1
@@ -31,7 +31,7 @@ def _scenes(clf: InProcess) -> None:
 @pytest.mark.parametrize(
     ("scene", "options", "image"),
     [
-        ("bulb.yaml", ["--size", "16x9"], Image(width=16, height=9, reference_height=36)),
+        ("bulb.yaml", ["--size", "16X9"], Image(width=16, height=9, reference_height=36)),
         ("bulb.yaml", ["--size", "64x36"], Image(width=64, height=36)),
         ("bulb.yaml", ["--size", "80x36"], Image(width=80, height=36)),
         ("bulb.yaml", ["--size", "16x9", "--set", "image.height=18"], Image(width=16, height=9, reference_height=18)),
@@ -42,8 +42,7 @@ def _scenes(clf: InProcess) -> None:
     ],
 )  # fmt: skip
 def test_the_size_keeps_the_reference(clf: InProcess, scene: str, options: list[str], image: Image) -> None:
-    ended = clf("render", scene, "-o", "out.png", *options)
-    assert ended.status == 0, ended
+    ended = works(clf("render", scene, "-o", "out.png", *options))
     assert load_scene(Path("out.png")).image == image
     moved = any(option.startswith("image.height") for option in options)
     assert (SAID in ended.err + ended.out) == (moved and image.reference_height is None)
@@ -68,8 +67,7 @@ def test_a_thumbnails_file_renders_the_print(clf: InProcess) -> None:
         ("bulb.yaml", "-o", "small.exr", "--size", "16x9"),
         ("small.exr", "-o", "again.exr", "--size", "64x36"),
     ):
-        ended = clf("render", *order)
-        assert ended.status == 0, ended
+        works(clf("render", *order))
     pictures = [read_exr(name)[0] for name in ("print.exr", "again.exr")]
     assert all(np.array_equal(pictures[0][name], pictures[1][name]) for name in "RGB")
     assert load_scene(Path("again.exr")) == load_scene(Path("print.exr"))
@@ -80,11 +78,9 @@ def test_frames_and_looks_for_them_say_it_too(clf: InProcess) -> None:
     Path("film.yaml").write_text(
         film + "animation: {duration: 0.2 s, fps: 10, tracks: {camera.fov: {expression: '40 + u'}}}\n"
     )
-    ended = clf("animate", "film.yaml", "-o", "f_#.png", "--set", "image.height=18")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "film.yaml", "-o", "f_#.png", "--set", "image.height=18"))
     assert SAID in ended.err + ended.out
-    ended = clf("animate", "film.yaml", "-o", "g_#.png", "--size", "16x9")
-    assert ended.status == 0, ended
+    ended = works(clf("animate", "film.yaml", "-o", "g_#.png", "--size", "16x9"))
     assert load_scene(Path("g_1.png")).image == Image(width=16, height=9, reference_height=36)
 
 

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
 import clfractal
 from clfractal.cli.slices import Stack, slice_scene
-from clfractal.engine import run as work
 from clfractal.files.exr import read_exr
 from clfractal.integrators.cut_plane import renderer_of
 from clfractal.scene.load import load_scene
-from tests.shell import InProcess
+from tests.interrupts import interrupted_at
+from tests.shell import InProcess, works
 
 SCENE = """version: 1
 formula: {name: hast, iterations: 20}
@@ -30,8 +29,9 @@ def names() -> list[str]:
 
 
 def test_slices_follow_each_other_along_the_normal(clf: InProcess) -> None:
-    ended = clf("slices", "scene.yaml", "-o", "s.exr", "-o", "t.png", "--count", "3", "--spacing", "0.25")
-    assert ended.status == 0, ended
+    ended = works(
+        clf("slices", "scene.yaml", "-o", "s.exr", "-o", "t.png", "--count", "3", "--spacing", "0.25")
+    )
     assert ended.err.splitlines()[-1].startswith("s_0001.exr to s_0003.exr: ")
     assert names() == [
         f"{word}_000{i}.{kind}" for word, kind in (("s", "exr"), ("t", "png")) for i in (1, 2, 3)
@@ -56,17 +56,8 @@ def test_by_default_they_reach_through_the_set(clf: InProcess) -> None:
     assert centers == pytest.approx([1.75, -1.75])
 
 
-def test_interrupted_the_finished_ones_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    render, calls = work.run, []
-
-    def interrupted(*arguments: Any, **settings: Any) -> Any:
-        calls.append(arguments)
-        if len(calls) == 3:
-            raise KeyboardInterrupt
-        return render(*arguments, **settings)
-
-    monkeypatch.setattr("clfractal.cli.numbered.run", interrupted)
-    with pytest.raises(KeyboardInterrupt):
+def test_interrupted_the_finished_ones_stay(clf: InProcess) -> None:
+    with interrupted_at(3):
         clf("slices", "scene.yaml", "--count", "4")
     assert names() == ["slice_0001.png", "slice_0002.png"]
 
@@ -89,13 +80,3 @@ REFUSED = {
 def test_what_is_refused(clf: InProcess, options: tuple[str, str]) -> None:
     assert clf("slices", "scene.yaml", *options).is_one_line(2, REFUSED[options])
     assert names() == []
-
-
-def test_a_slice_does_not_replace_the_scene_that_it_shows(clf: InProcess) -> None:
-    assert clf("slices", "scene.yaml", "--count", "2").status == 0
-    before = Path("slice_0002.png").read_bytes()
-    ended = clf("slices", "slice_0002.png", "--count", "2")
-    assert ended.is_one_line(
-        2, "slice_0002.png: would be overwritten, but it is read for this; name another output"
-    )
-    assert Path("slice_0002.png").read_bytes() == before

@@ -19,7 +19,7 @@ from clfractal.images.compose import compose
 from clfractal.images.modes import picture_size
 from clfractal.scene.load import load_scene
 from clfractal.scene.stereo import APART, Mode, Stereo
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, works
 
 MONO = SCENE + "output:\n  precision: {R: float, G: float, B: float}\n"
 STEREO = MONO + "stereo: {separation: 0.3}\n"
@@ -78,8 +78,7 @@ def test_every_mode_as_png_and_exr(
     here: Path, shell: InProcess, eyes: tuple[Planes, Planes], mode: str
 ) -> None:
     """`image` is one eye's size, but of the squeezed modes; what is shown are the pixels of both eyes' pictures."""
-    ended = shell("render", "scene.yaml", "-o", "a.png", "-o", "a.exr", "--set", f"stereo.mode={mode}")
-    assert ended.status == 0
+    ended = works(shell("render", "scene.yaml", "-o", "a.png", "-o", "a.exr", "--set", f"stereo.mode={mode}"))
     assert ended.err.splitlines()[-1].startswith("a.png, a.exr: ")
     assert added(here) == {"a.png", "a.exr"}
     width, height = SIZE
@@ -127,8 +126,7 @@ def test_the_right_eye_first(here: Path, shell: InProcess, eyes: tuple[Planes, P
 
 
 def test_a_pair_as_two_files(here: Path, shell: InProcess, eyes: tuple[Planes, Planes]) -> None:
-    ended = shell("render", "scene.yaml", "-o", "a.png", "-o", "b.exr", "--set", "stereo.mode=pair")
-    assert ended.status == 0
+    ended = works(shell("render", "scene.yaml", "-o", "a.png", "-o", "b.exr", "--set", "stereo.mode=pair"))
     assert ended.err.startswith("a_L.png, a_R.png, b_L.exr, b_R.exr: ")
     assert added(here) == {"a_L.png", "a_R.png", "b_L.exr", "b_R.exr"}
     for letter, view, expected in zip("LR", ("left", "right"), eyes, strict=True):
@@ -145,8 +143,9 @@ def test_a_pair_as_two_files(here: Path, shell: InProcess, eyes: tuple[Planes, P
 
 def test_both_views_in_one_file(here: Path, shell: InProcess, eyes: tuple[Planes, Planes]) -> None:
     """A PNG has room for one: of those there are two."""
-    ended = shell("render", "scene.yaml", "-o", "a.exr", "-o", "a.png", "--set", "stereo.mode=multi_view")
-    assert ended.status == 0
+    ended = works(
+        shell("render", "scene.yaml", "-o", "a.exr", "-o", "a.png", "--set", "stereo.mode=multi_view")
+    )
     assert ended.err.startswith("a.exr, a_L.png, a_R.png: ")
     assert added(here) == {"a.exr", "a_L.png", "a_R.png"}
     planes, header = read_exr(here / "a.exr")
@@ -251,8 +250,7 @@ def test_statistics_without_depth_take_a_quick_look(here: Path, shell: InProcess
 
 
 def test_a_warning_past_one_degree(here: Path, shell: InProcess) -> None:
-    ended = shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1")
-    assert ended.status == 0
+    ended = works(shell("render", "scene.yaml", "-o", "a.png", "--set", "stereo.separation=1"))
     assert told_parallax(ended.err.splitlines()[-1]) == pytest.approx(3, abs=0.1)
     assert "eyes tire beyond 1" in ended.err
     assert "tire" not in shell("render", "scene.yaml", "-o", "a.png").err
@@ -334,8 +332,7 @@ class TestCheck:
 
     def test_an_eye_inside_the_object_sees_nothing(self, here: Path, shell: InProcess) -> None:
         within = ("--set", "camera={position: [0, -0.2, 0], target: [0, 0, 0]}")
-        ended = shell("check", "scene.yaml", "--parallax", *within)
-        assert ended.status == 0
+        ended = works(shell("check", "scene.yaml", "--parallax", *within))
         assert "# parallax: the picture is empty\n" in ended.out
         rendered(shell, "scene.yaml", "a.png", "--stats", "s.json", *within)
         assert json.loads((here / "s.json").read_text())["stereo"]["parallax"] is None

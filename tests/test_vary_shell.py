@@ -16,7 +16,7 @@ from clfractal.cli import vary
 from clfractal.engine.engine import Engine
 from clfractal.files.environment_map import read_environment
 from clfractal.scene.load import load_scene
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, works
 
 SMALL = ("--size", "32x18", "--count", "3")
 
@@ -31,10 +31,11 @@ def pixels(path: str) -> Any:
 
 
 def test_scenes_pictures_and_a_sheet(clf: InProcess) -> None:
-    ended = clf(
-        "vary", "scene.yaml", *SMALL, "-o", "out", "--sheet", "sheet.png", "--set", "formula.iterations=7"
+    ended = works(
+        clf(
+            "vary", "scene.yaml", *SMALL, "-o", "out", "--sheet", "sheet.png", "--set", "formula.iterations=7"
+        )
     )
-    assert ended.status == 0, ended
     assert ended.out == ""
     assert names() == ["out", "sheet.png"]
     assert names("out") == [f"scene-0{n}.{kind}" for n in (1, 2, 3) for kind in ("png", "yaml")]
@@ -61,13 +62,11 @@ def test_scenes_pictures_and_a_sheet(clf: InProcess) -> None:
 
 def test_a_sheet_with_the_scenes_beside_it(clf: InProcess) -> None:
     Path("there").mkdir()
-    ended = clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "there/sheet.png")
-    assert ended.status == 0, ended
+    ended = works(clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "there/sheet.png"))
     assert names("there") == ["scene-01.yaml", "scene-02.yaml", "scene-03.yaml", "sheet.png"]
     sheet = pixels("there/sheet.png")
     assert sheet.shape == (18 + 16, 3 * 40 + 8, 3)
-    again = clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "pictures")
-    assert again.status == 0
+    works(clf("vary", "scene.yaml", "-n", "3", "--size", "32x18", "-o", "pictures"))
     for number in (1, 2, 3):
         name = f"scene-0{number}"
         assert Path(f"there/{name}.yaml").read_text() == Path(f"pictures/{name}.yaml").read_text()
@@ -91,10 +90,11 @@ def test_the_same_options_give_the_same_files(clf: InProcess) -> None:
 
 
 def test_small_pictures_have_the_scenes_proportions(clf: InProcess) -> None:
-    ended = clf(
-        "vary", "scene.yaml", "--count", "1", "--only", "camera", "--set", "image={width: 90, height: 45}"
+    works(
+        clf(
+            "vary", "scene.yaml", "--count", "1", "--only", "camera", "--set", "image={width: 90, height: 45}"
+        )
     )
-    assert ended.status == 0, ended
     assert pixels("scene-01.png").shape == (160, 320, 3)
     found = load_scene(Path("scene-01.yaml"))
     assert found.lights == load_scene(Path("scene.yaml")).lights
@@ -109,9 +109,9 @@ def test_ones_that_show_nothing_are_left_out(clf: InProcess, monkeypatch: pytest
 
     with monkeypatch.context() as patched:
         patched.setattr(vary, "worthwhile", judge)
-        assert clf("vary", "scene.yaml", *SMALL, "-o", "some").status == 0
+        works(clf("vary", "scene.yaml", *SMALL, "-o", "some"))
     assert len(judged) == 7
-    assert clf("vary", "scene.yaml", "--size", "32x18", "--count", "6", "-o", "all").status == 0
+    works(clf("vary", "scene.yaml", "--size", "32x18", "--count", "6", "-o", "all"))
     every = [Path(f"all/scene-0{number}.yaml").read_text().split("\n", 1)[1] for number in (2, 4, 6)]
     assert [Path(f"some/scene-0{n}.yaml").read_text().split("\n", 1)[1] for n in (1, 2, 3)] == every
 
@@ -125,8 +125,7 @@ def test_when_none_shows_anything(clf: InProcess, monkeypatch: pytest.MonkeyPatc
 
 
 def test_a_scene_that_is_empty_itself_has_variations(clf: InProcess) -> None:
-    ended = clf("vary", "scene.yaml", *SMALL, "--set", "camera.target=[0, -9, 0]", "--quiet")
-    assert ended.status == 0, ended
+    works(clf("vary", "scene.yaml", *SMALL, "--set", "camera.target=[0, -9, 0]", "--quiet"))
     assert len(names()) == 6
 
 
@@ -194,7 +193,7 @@ def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     Path("maps").mkdir()
     shutil.copy(folder("environments") / "dusk.exr", "maps/sky.exr")
     Path("maps/scene.yaml").write_text(SCENE + "environment: {file: sky.exr}\n")
-    assert clf("vary", "maps/scene.yaml", *SMALL, "--quiet").status == 0
+    works(clf("vary", "maps/scene.yaml", *SMALL, "--quiet"))
     found = load_scene(Path("scene-01.yaml"))
     assert found.environment is not None
     assert found.environment.file == "maps/sky.exr"
@@ -208,5 +207,5 @@ def test_textures_stay_reachable(clf: InProcess) -> None:
     Image.new("RGB", (4, 4), (200, 100, 50)).save("maps/oak.png")
     oak = "materials: {oak: {base: {color: {texture: oak.png}}}}\n"
     Path("maps/scene.yaml").write_text(SCENE + oak)
-    assert clf("vary", "maps/scene.yaml", *SMALL, "--quiet").status == 0
+    works(clf("vary", "maps/scene.yaml", *SMALL, "--quiet"))
     assert list(load_scene(Path("scene-01.yaml")).textures) == ["maps/oak.png"]

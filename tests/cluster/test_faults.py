@@ -17,7 +17,7 @@ from clfractal.files.exr import read_exr
 from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows
 from tests.cluster.kills import kill_at_random
 from tests.interrupts import planes
-from tests.shell import command, environment, process
+from tests.shell import command, environment, process, works
 
 resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")
 
@@ -75,8 +75,7 @@ def test_the_scheduler_does_not_return(folder: Path, farm: Farm, picture: dict[s
     _, told = running.communicate(timeout=60)
     assert running.returncode == 3
     assert told == f"{farm.address}: the scheduler is gone, and did not return in time\n"
-    ended = process(["render", "heavy.yaml", "-o", "out.exr", "--resume", "--stats", "s.json"], folder)
-    assert ended.status == 0, ended
+    works(process(["render", "heavy.yaml", "-o", "out.exr", "--resume", "--stats", "s.json"], folder))
     assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
     assert planes(folder / "out.exr") == picture
 
@@ -173,8 +172,7 @@ def test_a_killed_client_is_resumed(folder: Path, farm: Farm, picture: dict[str,
     with Client(folder, *order) as client:
         journal_grows(folder)
         assert client.running
-    ended = process([*order, "--resume", "--stats", "s.json"], folder)
-    assert ended.status == 0, ended
+    works(process([*order, "--resume", "--stats", "s.json"], folder))
     assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
     assert planes(folder / "out.exr") == picture
 
@@ -194,7 +192,7 @@ def test_a_full_disk(folder: Path, farm: Farm, picture: dict[str, bytes]) -> Non
     assert (full.returncode, full.stderr.count("\n")) == (2, 1), full
     assert full.stderr.startswith("out.exr.partial: ")
     assert not (folder / "out.exr").exists()
-    assert process([*order, "--resume"], folder).status == 0
+    works(process([*order, "--resume"], folder))
     assert planes(folder / "out.exr") == picture
 
 
@@ -217,7 +215,7 @@ def test_workers_of_another_version_or_without_a_device(folder: Path, farm: Farm
     assert not list(folder.glob("out.exr*"))
     # One that is fit is enough.
     farm.add()
-    assert process([*order, "--size", "64x48", "--quiet"], folder).status == 0
+    works(process([*order, "--size", "64x48", "--quiet"], folder))
 
 
 def _other_program(where: Path) -> None:
@@ -280,7 +278,7 @@ def test_the_last_worker_with_float64_is_lost(folder: Path, farm: Farm) -> None:
     assert status == 0, told
     assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
     own = ["render", "heavy.yaml", "--precision", "float64", "--samples", "100", "-o", "own.exr"]
-    assert process(own, folder).status == 0
+    works(process(own, folder))
     assert planes(folder / "out.exr") == planes(folder / "own.exr")
 
 

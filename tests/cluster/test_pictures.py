@@ -15,7 +15,7 @@ from clfractal.files.exr import read_exr
 from clfractal.scene import environment
 from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, journal_grows
 from tests.interrupts import planes
-from tests.shell import process
+from tests.shell import process, works
 
 TILES = 8 * 6
 PREFIX = "DASK_DISTRIBUTED__COMM__TLS__"
@@ -36,8 +36,7 @@ def test_a_picture_of_workers_here(folder: Path, picture: dict[str, bytes]) -> N
 
 
 def test_a_film(folder: Path, farm: Farm, film: list[dict[str, bytes]]) -> None:
-    ended = process(["animate", "film.yaml", "-o", "frame_##.exr", "--cluster", farm.address], folder)
-    assert ended.status == 0, ended
+    works(process(["animate", "film.yaml", "-o", "frame_##.exr", "--cluster", farm.address], folder))
     found = [folder / f"frame_{number:02d}.exr" for number in range(FRAMES)]
     assert [planes(path) for path in found] == film
     times = [path.stat().st_mtime_ns for path in found]
@@ -191,7 +190,7 @@ def test_tls(folder: Path) -> None:
         assert process([*order, farm.address], folder, lone).is_one_line(2, "farm.pem: has no key")
         unsafe = process([*order, farm.address.replace("tls", "tcp")], folder)
         assert unsafe.is_one_line(3, "does not answer within 10 s")
-    assert process([*order[:8], "own.exr"], folder).status == 0
+    works(process([*order[:8], "own.exr"], folder))
     assert planes(folder / "out.exr") == planes(folder / "own.exr")
 
 

@@ -26,7 +26,7 @@ from clfractal.engine import thumbnails
 from clfractal.errors import CacheWarning, DeviceError, FileError, UntriedError
 from clfractal.integrators import lanes
 from tests.interrupts import planes
-from tests.shell import SCENE, Ended, command, environment, process
+from tests.shell import SCENE, Ended, command, environment, process, works
 
 SECTIONS = ("lanes", "marches", "speeds")
 """What is measured of a device; a first picture waits for the first of them alone."""
@@ -58,28 +58,27 @@ def several(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 def rendered(folder: Path, scene: str) -> None:
     """Renders a scene of a folder, with the cache in it."""
     (folder / "scene.yaml").write_text(scene)
-    ended = process(
-        ["render", "scene.yaml", "-o", "a.exr"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")}
+    works(
+        process(["render", "scene.yaml", "-o", "a.exr"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")})
     )
-    assert ended.status == 0, ended
     assert list((folder / "cache" / "programs").iterdir())
 
 
 def measures(folder: Path) -> None:
     """Measures all devices, with the cache in a folder."""
-    ended = process(["devices"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")})
-    assert ended.status == 0, ended
+    works(process(["devices"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")}))
     assert all((folder / "cache" / f"{section}.json").exists() for section in SECTIONS)
 
 
 def again(good: Path, folder: Path) -> Ended:
     """Renders the scene with the cache in `folder`; the picture has to be the same."""
-    ended = process(
-        ["render", str(good / "scene.yaml"), "-o", "b.exr", "--quiet"],
-        folder,
-        {"CLFRACTAL_CACHE": str(folder / "cache")},
+    ended = works(
+        process(
+            ["render", str(good / "scene.yaml"), "-o", "b.exr", "--quiet"],
+            folder,
+            {"CLFRACTAL_CACHE": str(folder / "cache")},
+        )
     )
-    assert ended.status == 0, ended
     assert planes(folder / "b.exr") == planes(good / "a.exr")
     return ended
 
@@ -344,10 +343,11 @@ def test_a_cache_that_cannot_be_written(good: Path, tmp_path: Path) -> None:
     (tmp_path / "cache").write_bytes(b"")
     (tmp_path / "tmp").mkdir()
     extra = {"CLFRACTAL_CACHE": str(tmp_path / "cache"), "TMPDIR": str(tmp_path / "tmp")}
-    ended = process(
-        ["render", str(good / "scene.yaml"), "-o", "b.exr"], tmp_path, {**extra, "CLFRACTAL_LANES": "1"}
+    ended = works(
+        process(
+            ["render", str(good / "scene.yaml"), "-o", "b.exr"], tmp_path, {**extra, "CLFRACTAL_LANES": "1"}
+        )
     )
-    assert ended.status == 0, ended
     assert f"the cache folder {str(tmp_path / 'cache')!r} cannot be used: " in ended.err
     (tmp_path / "cache").unlink()
     shutil.copytree(good / "cache", tmp_path / "cache")

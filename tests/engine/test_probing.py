@@ -19,7 +19,7 @@ from clfractal.images.probe import CHANNELS, Probe
 from clfractal.scene.model import Scene
 from tests.render.shots import BALL, BALL_RADIUS, engine_of
 from tests.scenes import scene_of
-from tests.shell import InProcess
+from tests.shell import InProcess, works
 
 CAMERA: dict[str, Any] = {"position": [0, -3, 0], "target": [0, 0, 0], "fov": 50}
 SIZE = (96, 64)
@@ -159,8 +159,7 @@ def test_films_of_two_eyes(engine: Engine) -> None:
 
 
 def test_the_shell(clf: InProcess) -> None:
-    ended = clf("probe", "scene.yaml", "48,32", "--size", "96x64", "--json")
-    assert ended.status == 0, ended
+    ended = works(clf("probe", "scene.yaml", "48,32", "--size", "96x64", "--json"))
     told = json.loads(ended.out)
     assert told == clfractal.probe(
         with_size(clfractal.load_scene("scene.yaml"), (96, 64)), 48, 32

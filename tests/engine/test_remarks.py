@@ -21,7 +21,7 @@ from clfractal.scene.model import Scene
 from tests.pictures import scene_paths, small_framebuffers
 from tests.render.shots import BALL, engine_of
 from tests.scenes import scene_of
-from tests.shell import Ended, InProcess
+from tests.shell import Ended, InProcess, works
 
 CAMERA: dict[str, Any] = {"position": [0, -4, 0]}
 AWAY: dict[str, Any] = {"position": [0, -4, 0], "target": [0, -8, 0]}
@@ -238,8 +238,7 @@ camera: {position: [0, -3, 0]}
 
 def rendered(clf: InProcess, *options: str) -> tuple[list[str], Ended]:
     """What `--stats` holds, and how the command ended."""
-    ended = clf("render", "scene.yaml", "-o", "a.exr", "--stats", "a.json", *options)
-    assert ended.status == 0, ended
+    ended = works(clf("render", "scene.yaml", "-o", "a.exr", "--stats", "a.json", *options))
     assert ended.out == ""
     return list(json.loads(Path("a.json").read_text())["remarks"]), ended
 
