@@ -59,6 +59,7 @@ def interrupted_at(number: int) -> Iterator[None]:
             raise KeyboardInterrupt
         return render(*arguments, **settings)
 
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("clfractal.cli.numbered.run", interrupted)
-        yield
+        with pytest.raises(KeyboardInterrupt):
+            yield

@@ -64,3 +64,26 @@ def interrupt(
         if running.poll() is None:
             os.killpg(running.pid, signal.SIGKILL)
             running.wait()
+
+
+def interrupted_in_a_kernel(folder: Path, *options: str) -> list[str]:
+    """What three renders told that were interrupted while their kernels ran: soon, and without a lost tile."""
+    (folder / "endless.yaml").write_text(ENDLESS)
+    journal, told, seconds = folder / "out.exr.partial", [], []
+
+    def rendering() -> bool:
+        if not journal.exists():
+            return False
+        time.sleep(1.0)  # the program is loaded and its kernel runs
+        return True
+
+    for _ in range(3):
+        status, line, took = interrupt(folder, rendering, {}, *options)
+        assert status == 130
+        assert not (folder / "out.exr").exists()
+        assert journal.exists() == ("--resume" in line), "without a finished tile nothing stays"
+        assert took < LIMIT_SECONDS
+        told.append(line)
+        seconds.append(took)
+    assert min(seconds) < PROMISE_SECONDS
+    return told

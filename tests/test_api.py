@@ -166,30 +166,6 @@ def test_a_tone_reaches_what_is_shown_and_not_the_film(tmp_path: Path) -> None:
     assert header["clfractalTone"] == "agx"
 
 
-def test_exposure_and_transparency_reach_the_picture(tmp_path: Path) -> None:
-    dark = clfractal.render(SCENE + "output: {exposure: -2}\nbackground: transparent\n")
-    assert dark.header["exposure"] == -2
-    assert dark.header["transparent"] is True
-    dark.save(tmp_path / "a.png")
-    color_type = (tmp_path / "a.png").read_bytes()[25]
-    assert color_type == 6  # colours and alpha
-
-
-@pytest.mark.parametrize(
-    ("settings", "message"),
-    [
-        ({"samples": 0}, "^samples: must be from 1"),
-        ({"precision": "float128"}, "^precision: must be auto, float32 or float64, got 'float128'"),
-        ({"channels": ["R", "Q"]}, "^channels: unknown channel 'Q'"),
-        ({"region": (0, 0, 41, 1)}, "^region: must lie inside the picture"),
-        ({"device": "nosuch"}, "unknown device 'nosuch'"),
-    ],
-)
-def test_wrong_settings(settings: dict[str, object], message: str) -> None:
-    with pytest.raises(clfractal.ClfractalError, match=message):
-        clfractal.render(SCENE, **settings)  # type: ignore[arg-type]
-
-
 def test_escape_of_points_known_by_hand() -> None:
     """Power 2 on the z axis is the real quadratic map z -> z^2 + c: -1 and 0.25 stay, 0.5 and 3 leave."""
     points = np.array([[0, 0, -1.0], [0, 0, 0.25], [0, 0, 0.5], [0, 0, 3.0], [0, 0, 0]])
@@ -230,27 +206,6 @@ def test_escape_of_a_formula_of_ones_own(tmp_path: Path, precision: str) -> None
     )
     counts, _ = clfractal.escape(tmp_path / "cube.yaml", points, iterations=20, precision=precision)
     assert counts.tolist() == [4, 1, 0]
-
-
-@pytest.mark.parametrize(
-    ("formula", "settings", "message"),
-    [
-        ("mandelbul", {}, "did you mean 'mandelbulb'"),
-        ("mandelbulb", {"parameters": {"powr": 3}}, "did you mean 'power'"),
-        ("mandelbulb", {"precision": "half"}, "^precision: must be float32 or float64"),
-        ("mandelbulb", {"iterations": -1}, "^iterations: must be"),
-        ("mandelbulb", {"iterations": 1.5}, "^iterations: must be"),
-    ],
-)
-def test_wrong_questions_to_escape(formula: str, settings: dict[str, object], message: str) -> None:
-    with pytest.raises(clfractal.FormulaError, match=message):
-        clfractal.escape(formula, [[0, 0, 0]], **{"iterations": 5, **settings})  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("points", [[0, 0, 0], [[0, 0]], np.zeros((2, 3, 1))])
-def test_points_of_a_wrong_shape(points: object) -> None:
-    with pytest.raises(clfractal.FormulaError, match=r"^points: must have shape"):
-        clfractal.escape("hast", points, iterations=5)  # type: ignore[arg-type]
 
 
 def test_no_points_are_no_mistake() -> None:

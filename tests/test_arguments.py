@@ -39,6 +39,7 @@ RENDER: list[tuple[dict[str, Any], str]] = [
     ({"channels": []}, "channels: a picture needs at least one channel"),
     ({"quality": ["good"]}, "quality: must be a word such as good, got a list of 1"),
     ({"quality": "god"}, "quality: unknown quality 'god'; did you mean 'good'?"),
+    ({"device": "nosuch"}, "unknown device 'nosuch'"),
     ({"device": 3}, "device: must be text such as cpu, gpu, 0:0 or part of a name, got 3"),
     ({"progress": 3}, "progress: must be a function, got 3"),
 ]
@@ -202,6 +203,12 @@ def test_a_section_that_is_made_by_hand_is_checked() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
+        ({"formula": "mandelbul"}, "unknown formula 'mandelbul'; did you mean 'mandelbulb'"),
+        ({"parameters": {"powr": 3}}, "parameters.powr: "),
+        ({"iterations": 1.5}, "iterations: must be"),
+        ({"points": [0, 0, 0]}, "points: must have shape"),
+        ({"points": [[0, 0]]}, "points: must have shape"),
+        ({"points": np.zeros((2, 3, 1))}, "points: must have shape"),
         ({"formula": 5}, "formula: must be a name of the library, a path or a mapping, got 5"),
         ({"formula": None}, "formula: must be a name of the library, a path or a mapping, got nothing"),
         ({"parameters": [8]}, "parameters: must be a mapping, got a list of 1"),
@@ -351,7 +358,6 @@ def test_variations_take_what_render_takes(tmp_path: Path) -> None:
         assert [each.changes for each in clfractal.variations(source, count=2)] == [
             each.changes for each in wanted
         ]
-    refused(lambda: clfractal.variations(3), "scene: must be a path, YAML text or a mapping, got 3")  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])

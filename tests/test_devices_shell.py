@@ -6,7 +6,6 @@ import json
 import random
 import signal
 import subprocess
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from clfractal.errors import DeviceError
 from clfractal.files.exr import read_exr
 from tests.halves import halves_of
 from tests.interrupts import planes
-from tests.long_renders import ENDLESS, HEAVY, LIMIT_SECONDS, PROMISE_SECONDS, TILES, interrupt
+from tests.long_renders import HEAVY, TILES, interrupted_in_a_kernel
 from tests.shell import Ended, InProcess, command, environment, process, works
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
@@ -94,17 +93,15 @@ def test_each_view_of_a_file_names_its_own_devices(
     halves: str,
     layout: bool,
     tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    clf: InProcess,
 ) -> None:
     """By view, and together as the statistics tell it."""
     scene = HEAVY.replace("samples: 16", "samples: 1") + "stereo: {mode: multi_view, separation: 0.1}\n"
     if layout:
         scene += "layout: {views: [{}, {renderer: {samples: 2}}]}\n"
     (tmp_path / "heavy.yaml").write_text(scene)
-    monkeypatch.chdir(tmp_path)
     render = ("render", "heavy.yaml", "-o", "out.exr", "--device", halves, "--stats", "stats.json")
-    assert InProcess(capsys)(*render).status == 0
+    works(clf(*render))
     header = read_exr(tmp_path / "out.exr")[1]
     shares = json.loads((tmp_path / "stats.json").read_text())
     assert "clfractalDevices" not in header
@@ -125,11 +122,10 @@ def test_no_device_is_left(
     halves: str,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
+    clf: InProcess,
 ) -> None:
     """Status 3 and one line more than those of the devices; what was done is kept, and one device continues it."""
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    monkeypatch.chdir(tmp_path)
     execute = LocalExecutor.execute
 
     def failing(own: LocalExecutor, *arguments: Any) -> Iterator[Result]:
@@ -140,18 +136,17 @@ def test_no_device_is_left(
             if done >= 5:
                 raise DeviceError(f"{own.device.info.name}: the device failed while rendering: OUT_OF_ORDER")
 
-    monkeypatch.setattr(LocalExecutor, "execute", failing)
-    ended = InProcess(capsys)("render", "heavy.yaml", "-o", "out.exr", "--device", halves)
+    with monkeypatch.context() as patch:
+        patch.setattr(LocalExecutor, "execute", failing)
+        ended = clf("render", "heavy.yaml", "-o", "out.exr", "--device", halves)
     assert ended.status == 3
     lines = ended.err.splitlines()
     assert [line for line in lines if "is left out, others do its work: " in line] == lines[-2:-1]
     assert lines[-1].startswith("no device is left: ")
     assert (tmp_path / "out.exr.partial").exists()
     assert not (tmp_path / "out.exr").exists()
-    monkeypatch.undo()
-    monkeypatch.chdir(tmp_path)
     index = halves.split("/")[0]
-    ended = InProcess(capsys)("render", "heavy.yaml", "-o", "out.exr", "--resume", "--device", index)
+    ended = clf("render", "heavy.yaml", "-o", "out.exr", "--resume", "--device", index)
     assert ended.status == 0
     assert planes(tmp_path / "out.exr") == planes(whole)
     # Of the tiles of the earlier run it is still known who made them.
@@ -161,22 +156,8 @@ def test_no_device_is_left(
 
 
 def test_ctrl_c_with_several_devices(halves: str, tmp_path: Path) -> None:
-    (tmp_path / "endless.yaml").write_text(ENDLESS)
-    journal, seconds = tmp_path / "out.exr.partial", []
-    for _ in range(3):
-
-        def rendering() -> bool:
-            if not journal.exists():
-                return False
-            time.sleep(1.0)
-            return True
-
-        status, told, took = interrupt(tmp_path, rendering, {}, "--device", halves)
-        assert status == 130
+    for told in interrupted_in_a_kernel(tmp_path, "--device", halves):
         assert told.endswith("out.exr: interrupted before a tile was done\n")
-        assert took < LIMIT_SECONDS
-        seconds.append(took)
-    assert min(seconds) < PROMISE_SECONDS
 
 
 def test_a_film_by_several_devices(halves: str, tmp_path: Path) -> None:

@@ -165,9 +165,10 @@ def interrupted(clf: InProcess, *options: str) -> None:
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    with pytest.MonkeyPatch.context() as patch, pytest.raises(KeyboardInterrupt):
+    with pytest.MonkeyPatch.context() as patch:
         patch.setattr("clfractal.files.moving._frame", interrupt)
-        clf("animate", "scene.yaml", *options)
+        with pytest.raises(KeyboardInterrupt):
+            clf("animate", "scene.yaml", *options)
 
 
 def test_a_film_that_was_interrupted_goes_on(clf: InProcess) -> None:

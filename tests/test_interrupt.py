@@ -1,9 +1,14 @@
-"""Ctrl-C: status 130 and one line, at once, whatever the program is doing."""
+"""Ctrl-C, and what batch systems, `timeout` and closed terminals send: one line, at once, whatever is being done."""
 
 from __future__ import annotations
 
+import os
 import re
+import signal
+import subprocess
+import sys
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
@@ -13,13 +18,17 @@ import pytest
 
 from clfractal.cli.shell import Shell
 from clfractal.cli.unfinished import Unfinished
-from clfractal.device.select import choose
+from clfractal.device.select import choose, sees_host_writes
 from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
-from tests.long_renders import ENDLESS, LIMIT_SECONDS, PROMISE_SECONDS, interrupt
-from tests.shell import SCENE
+from tests.interrupts import planes
+from tests.long_renders import ENDLESS, LIMIT_SECONDS, interrupt, interrupted_in_a_kernel
+from tests.shell import SCENE, command, environment, process, works
 
-pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
+pytestmark = [
+    pytest.mark.usefixtures("interrupts_are_not_ignored"),
+    pytest.mark.skipif(sys.platform == "win32", reason="Windows has no such signals"),
+]
 
 
 def _is_past(moment: float) -> bool:
@@ -27,25 +36,8 @@ def _is_past(moment: float) -> bool:
 
 
 def test_in_the_middle_of_a_kernel(tmp_path: Path) -> None:
-    (tmp_path / "endless.yaml").write_text(ENDLESS)
-    journal = tmp_path / "out.exr.partial"
-    seconds = []
-    for _ in range(3):
-
-        def rendering() -> bool:
-            if not journal.exists():
-                return False
-            time.sleep(1.0)  # the program is loaded and its kernel runs
-            return True
-
-        status, told, took = interrupt(tmp_path, rendering, {}, "--quiet")
-        assert status == 130
+    for told in interrupted_in_a_kernel(tmp_path, "--quiet"):
         assert re.fullmatch(r"(clfractal|out\.exr(\.partial)?): interrupted.*\n", told), told
-        assert not (tmp_path / "out.exr").exists()
-        assert journal.exists() == ("--resume" in told), "without a finished tile nothing stays"
-        assert took < LIMIT_SECONDS
-        seconds.append(took)
-    assert min(seconds) < PROMISE_SECONDS
 
 
 def test_in_the_middle_of_a_compilation(tmp_path: Path) -> None:
@@ -56,14 +48,14 @@ def test_in_the_middle_of_a_compilation(tmp_path: Path) -> None:
 
     def compiling() -> bool:
         found = [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-        for process in found:
+        for number in found:
             try:
-                words = Path(f"/proc/{process}/cmdline").read_bytes().split(b"\0")
-                owner = Path(f"/proc/{process}/environ").read_bytes()
+                words = Path(f"/proc/{number}/cmdline").read_bytes().split(b"\0")
+                owner = Path(f"/proc/{number}/environ").read_bytes()
             except OSError:
                 continue
             if b"clfractal.device.child" in words and str(cache).encode() in owner:
-                children.append(process)
+                children.append(number)
         return bool(children)
 
     extra = {"CLFRACTAL_CACHE": str(cache), "CLFRACTAL_LANES": "1", "POCL_CACHE_DIR": str(tmp_path / "pocl")}
@@ -110,3 +102,228 @@ def test_a_main_thread_that_does_not_answer(
         raise KeyboardInterrupt
     assert [path.name for path in tmp_path.iterdir()] == left
     assert not shell.leaving
+
+
+# --- Python ---
+
+
+# The answer takes milliseconds on an idle machine; the bound lets a busy one be slow.
+MOST_SECONDS = 2.0
+
+# Work that would take minutes, and how it begins again afterwards: the first call is short, so that nothing is compiled
+# while the clock runs.
+PRELUDE = """
+import os, signal, sys, threading, time
+import numpy as np
+import clfractal
+
+places = np.random.default_rng(1).uniform(-0.3, 0.3, (400_000, 3))
+# Light points first: the launches grow, and then each of them would take minutes.
+mixed = np.concatenate([places + 5, places])
+text = '''version: 1
+formula: {name: mandelbulb, iterations: 8}
+image: {width: 40, height: 36}
+camera: {position: [0, -3, 0]}
+'''
+scene = clfractal.load_scene(text)
+large = scene.model_copy(update={"image": {"width": 4096, "height": 4096}})
+
+
+def interrupted(call):
+    asked = []
+
+    def ask():
+        asked.append(time.perf_counter())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.4, ask)
+    timer.start()
+    try:
+        call()
+    except KeyboardInterrupt:
+        return time.perf_counter() - asked[0]
+    finally:
+        timer.cancel()
+    return float("inf")
+"""
+
+CALLS = {
+    "escape": (
+        "clfractal.escape('mandelbulb', places[:9], iterations=9)",
+        "clfractal.escape('mandelbulb', places, iterations=1_000_000)",
+    ),
+    "escape after light points": (
+        "clfractal.escape('mandelbulb', places[:9], iterations=9)",
+        "clfractal.escape('mandelbulb', mixed, iterations=100_000_000)",
+    ),
+    "distances": (
+        "clfractal.distances('mandelbulb', places[:9])",
+        "clfractal.distances('mandelbulb', mixed, iterations=1_000_000)",
+    ),
+    "render": ("clfractal.render(scene)", "clfractal.render(large, samples=10_000)"),
+    "refine": (
+        "list(engine.refine(scene))",
+        "list(engine.refine(large.model_copy(update={'image': {'width': 512, 'height': 512}}), samples=20_000))",
+    ),
+    "voxelize": (
+        "clfractal.voxelize(scene, resolution=16)",
+        "clfractal.voxelize(text.replace('8}', '1_000_000}').replace('_', ''), resolution=256)",
+    ),
+    "mesh": (
+        "clfractal.mesh(scene, resolution=16)",
+        "clfractal.mesh(clfractal.Volume(noise), level=0.5)",
+    ),
+    "variations": (
+        "clfractal.variations(scene, count=2)",
+        "clfractal.variations(scene, count=100_000)",
+    ),
+}
+
+
+def test_every_call_hears_ctrl_c(tmp_path: Path) -> None:
+    if not sees_host_writes(choose().info):
+        pytest.skip("the device ends no launch early")
+    pytest.importorskip("skimage")
+    code = (
+        PRELUDE
+        + "engine = clfractal.Engine()\nnoise = np.random.default_rng(1).random((400, 400, 400), np.float32)\n"
+    )
+    for name, (first, long) in CALLS.items():
+        code += f"{first}\nprint({name!r}, interrupted(lambda: {long}), sep=': ', flush=True)\n{first}\n"
+    command = [sys.executable, "-P", "-c", code]
+    ended = subprocess.run(
+        command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=200
+    )
+    assert ended.returncode == 0, ended.stderr[-3000:]
+    took = dict(line.split(": ") for line in ended.stdout.splitlines())
+    print(took)
+    assert list(took) == list(CALLS)
+    assert {name: seconds for name, seconds in took.items() if float(seconds) > MOST_SECONDS} == {}
+    assert min(map(float, took.values())) >= 0
+
+
+# --- SIGTERM and SIGHUP ---
+
+
+# Many tiles, of which each takes some hundredths of a second.
+TILED = """version: 1
+formula: {name: mandelbulb, iterations: 8}
+image: {width: 512, height: 288}
+camera: {position: [1.2, -2.2, 1.0]}
+renderer: {samples: 64}
+animation: {frames: 40}
+"""
+
+
+class Work:
+    """A command that runs, in a folder with the scene."""
+
+    def __init__(self, folder: Path, *arguments: str, before: Callable[[], object] | None = None) -> None:
+        (folder / "scene.yaml").write_text(TILED)
+        self.running = subprocess.Popen(
+            command(*arguments),
+            cwd=folder,
+            env=environment(),
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=before,
+        )
+
+    def wait_until(self, ready: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 120
+        while not ready():
+            assert self.running.poll() is None, self.running.communicate()[1]
+            assert time.monotonic() < deadline
+            time.sleep(0.01)
+
+    def ended_by(self, *signals: signal.Signals) -> tuple[int, str]:
+        """Sends the signals; gives status and standard error."""
+        for each in signals:
+            self.running.send_signal(each)
+        try:
+            told = self.running.communicate(timeout=60)[1]
+        finally:
+            if self.running.poll() is None:
+                os.killpg(self.running.pid, signal.SIGKILL)
+        return self.running.returncode, told
+
+
+def _has_tiles(journal: Path) -> Callable[[], bool]:
+    # (A tile of its four channels has 64 KB; before the first there is but the header.)
+    return lambda: journal.exists() and journal.stat().st_size > 100_000
+
+
+@pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
+def test_a_render_is_continued(tmp_path: Path, sent: signal.Signals) -> None:
+    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
+    status, told = work.ended_by(sent)
+    assert status == 128 + sent
+    found = re.fullmatch(
+        r"a\.exr\.partial: interrupted with (\d+) of (\d+) tiles done; --resume continues\n", told
+    )
+    assert found, told
+    assert 0 < int(found[1]) < int(found[2])
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["a.exr.partial", "scene.yaml"]
+    if sent == signal.SIGHUP:
+        return
+    works(process(["render", "scene.yaml", "-o", "a.exr", "--resume"], tmp_path))
+    works(process(["render", "scene.yaml", "-o", "b.exr", "--quiet"], tmp_path))
+    assert planes(tmp_path / "a.exr") == planes(tmp_path / "b.exr")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("animate", "scene.yaml", "-o", "f_####.exr"),
+        ("animate", "scene.yaml", "-o", "f.mkv"),
+        ("voxelize", "scene.yaml", "-o", "a.nrrd", "--resolution", "1024"),
+        ("mesh", "scene.yaml", "-o", "a.ply", "--resolution", "1024"),
+        ("watch", "scene.yaml", "-o", "a.png"),
+        ("render", "scene.yaml", "-o", "a.png", "--cluster", "local:1"),
+    ],
+    ids=lambda arguments: " ".join((*arguments[:1], *arguments[3:])),
+)
+def test_long_commands(tmp_path: Path, arguments: tuple[str, ...]) -> None:
+    if "--cluster" in arguments:
+        pytest.importorskip("distributed")
+    work = Work(tmp_path, *arguments, "--quiet")
+    moment = time.monotonic() + 2.0
+    work.wait_until(lambda: time.monotonic() > moment)
+    status, told = work.ended_by(signal.SIGTERM)
+    assert status == 143, told
+    assert re.fullmatch(r"[^\n]*(interrupted|no longer watched)[^\n]*\n", told), told
+    left = {path.name for path in tmp_path.iterdir()}
+    assert not [name for name in left if name.endswith(".tmp")]
+    if "--resume" in told and "0 of" not in told:
+        assert [name for name in left if name != "scene.yaml"]
+
+
+def test_what_was_ignored_stays_so(tmp_path: Path) -> None:
+    """`nohup`, and a job in the background of a script; SIGTERM ends both."""
+
+    def ignore() -> None:
+        for each in (signal.SIGHUP, signal.SIGINT):
+            signal.signal(each, signal.SIG_IGN)
+
+    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet", before=ignore)
+    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
+    before = (tmp_path / "a.exr.partial").stat().st_size
+    work.running.send_signal(signal.SIGHUP)
+    work.running.send_signal(signal.SIGINT)
+    work.wait_until(lambda: (tmp_path / "a.exr.partial").stat().st_size > before)
+    status, told = work.ended_by(signal.SIGTERM)
+    assert status == 143
+    assert "--resume continues" in told
+
+
+def test_the_first_of_several_counts(tmp_path: Path) -> None:
+    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
+    work.running.send_signal(signal.SIGTERM)
+    time.sleep(0.02)
+    status, told = work.ended_by(signal.SIGHUP, signal.SIGTERM, signal.SIGINT)
+    assert status == 143
+    assert told.count("\n") == 1
+    assert "--resume continues" in told

@@ -10,9 +10,7 @@ from pathlib import Path
 import pytest
 
 import clfractal
-from clfractal.cli import run
 from clfractal.cli.progress import shown_rate
-from clfractal.cli.shell import Shell
 from tests.shell import SCENE, Ended, environment, process
 
 posix = pytest.mark.skipif(os.name != "posix", reason="the shell of this system cannot close streams")
@@ -23,12 +21,9 @@ NAMED = SCENE.replace(
 )
 
 
-@pytest.fixture
-def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "scene.yaml").write_text(SCENE)
-    (tmp_path / "named.yaml").write_text(NAMED, encoding="utf-8")
-    return tmp_path
+@pytest.fixture(autouse=True)
+def _named(here: Path) -> None:
+    (here / "named.yaml").write_text(NAMED, encoding="utf-8")
 
 
 def closed(line: str, streams: str, folder: Path) -> Ended:
@@ -74,32 +69,6 @@ def test_streams_that_lack_letters(here: Path) -> None:
 def test_speeds_are_never_zero() -> None:
     rates = {3.456e6: "3.46 Mrays/s", 1.2e5: "0.12 Mrays/s", 4_460: "4.5 krays/s", 12.2: "12 rays/s"}
     assert {rate: shown_rate(rate) for rate in rates} == rates
-
-
-def test_an_interrupt_before_the_first_tile(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Then no unfinished work stays, and none is spoken of."""
-
-    def interrupted(*_: object, **__: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("clfractal.engine.local_executor.LocalExecutor.execute", interrupted)
-    shell = Shell(owns_process=False)
-    with pytest.raises(KeyboardInterrupt):
-        run(["render", "scene.yaml", "-o", "out.png"], shell)
-    assert shell.state() == "out.png: interrupted before a tile was done"
-    assert not list(here.glob("out*"))
-
-
-def test_an_interrupt_after_some_tiles(here: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def interrupted(*_: object) -> None:
-        raise KeyboardInterrupt
-
-    monkeypatch.setattr("clfractal.cli.progress.Reporter.__call__", interrupted)
-    shell = Shell(owns_process=False)
-    with pytest.raises(KeyboardInterrupt):
-        run(["render", "scene.yaml", "-o", "out.png"], shell)
-    assert shell.state().startswith("out.png.partial: interrupted with ")
-    assert [path.name for path in here.glob("out*")] == ["out.png.partial"]
 
 
 def test_compiling_for_looks_counts() -> None:
