@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import os
 import signal
-import subprocess
 import time
 from collections.abc import Callable
 from pathlib import Path
 
-from tests.shell import command, environment
+from tests.shell import Running
 
 # Heavy enough for several batches of tiles, each of a fraction of a second.
 HEAVY = """version: 1
@@ -42,28 +40,11 @@ def interrupt(
     folder: Path, ready: Callable[[], bool], extra: dict[str, str], *options: str
 ) -> tuple[int, str, float]:
     """Starts a render, waits until it is `ready`, sends SIGINT; gives status, standard error and seconds."""
-    running = subprocess.Popen(
-        command("render", "endless.yaml", "-o", "out.exr", *options),
-        cwd=folder,
-        env=environment(extra),
-        stderr=subprocess.PIPE,
-        text=True,
-        start_new_session=True,
-    )
-    try:
-        deadline = time.monotonic() + 120
-        while not ready():
-            assert running.poll() is None, running.communicate()[1]
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-        start = time.monotonic()
-        running.send_signal(signal.SIGINT)
-        _, told = running.communicate(timeout=60)
-        return running.returncode, told, time.monotonic() - start
-    finally:
-        if running.poll() is None:
-            os.killpg(running.pid, signal.SIGKILL)
-            running.wait()
+    running = Running(folder, "render", "endless.yaml", "-o", "out.exr", *options, extra=extra)
+    running.wait_until(ready)
+    start = time.monotonic()
+    status, told = running.ended_by(signal.SIGINT)
+    return status, told, time.monotonic() - start
 
 
 def interrupted_in_a_kernel(folder: Path, *options: str) -> list[str]:

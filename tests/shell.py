@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import signal
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -73,7 +75,71 @@ def command(*arguments: str | Path) -> list[str]:
 
 def process(arguments: Sequence[str | Path], folder: Path, extra: Mapping[str, str] | None = None) -> Ended:
     """Runs the program as a process of its own in a folder."""
+    return _run(command(*arguments), folder, extra)
+
+
+def python(
+    code: str, *arguments: str | Path, folder: Path | None = None, extra: Mapping[str, str] | None = None
+) -> Ended:
+    """Runs a text that may import the program under test, as a process of its own."""
+    return _run([sys.executable, "-P", "-c", code, *map(str, arguments)], folder, extra)
+
+
+def _run(words: Sequence[str], folder: Path | None, extra: Mapping[str, str] | None) -> Ended:
     ended = subprocess.run(
-        command(*arguments), cwd=folder, env=environment(extra), capture_output=True, text=True, timeout=240
+        words, cwd=folder, env=environment(extra), capture_output=True, text=True, timeout=240
     )
     return Ended(ended.returncode, ended.stdout, ended.stderr)
+
+
+def wait_until(
+    ready: Callable[[], bool], running: subprocess.Popen[str] | None = None, seconds: float = 120
+) -> None:
+    """Until something is so; that takes too long, or who should bring it about ends before, is a failure."""
+    deadline = time.monotonic() + seconds
+    while not ready():
+        assert running is None or running.poll() is None, running.communicate()[1]
+        assert time.monotonic() < deadline
+        time.sleep(0.005)
+
+
+class Running:
+    """The program at work in a folder, in a session of its own; or another command."""
+
+    def __init__(
+        self,
+        folder: Path,
+        *arguments: str,
+        words: Sequence[str] | None = None,
+        extra: Mapping[str, str] | None = None,
+        before: Callable[[], object] | None = None,
+    ) -> None:
+        self.process = subprocess.Popen(
+            words or command(*arguments),
+            cwd=folder,
+            env=environment(extra),
+            stderr=subprocess.PIPE,
+            text=True,
+            start_new_session=True,
+            preexec_fn=before,
+        )
+
+    def wait_until(self, ready: Callable[[], bool]) -> None:
+        wait_until(ready, self.process)
+
+    def ended_by(self, *signals: signal.Signals) -> tuple[int, str]:
+        """Sends the signals; gives status and standard error."""
+        for each in signals:
+            self.process.send_signal(each)
+        try:
+            told = self.process.communicate(timeout=60)[1]
+        finally:
+            if self.process.poll() is None:
+                os.killpg(self.process.pid, signal.SIGKILL)
+                self.process.wait()
+        return self.process.returncode, told
+
+
+def has_bytes(path: Path, least: int) -> Callable[[], bool]:
+    """Whether a file is there that has more than so many."""
+    return lambda: path.exists() and path.stat().st_size > least

@@ -6,8 +6,6 @@ import ast
 import importlib
 import io
 import json
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -17,7 +15,7 @@ from PIL import Image
 import clfractal
 from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
-from tests.shell import SCENE, environment
+from tests.shell import SCENE, python, works
 
 
 def test_everything_public_is_there() -> None:
@@ -64,9 +62,7 @@ def test_a_fresh_session_finds_every_function_with_its_help() -> None:
         "pages = [pydoc.plain(pydoc.render_doc(each)) for each in (clfractal, clfractal.render)]\n"
         "print(json.dumps([told, *pages]))"
     )
-    command = [sys.executable, "-P", "-c", code]
-    ended = subprocess.run(command, capture_output=True, text=True, check=True, env=environment())
-    told, module, render = json.loads(ended.stdout)
+    told, module, render = json.loads(works(python(code)).out)
     assert sorted(told) == sorted(FUNCTIONS)
     for name, (parameters, text) in told.items():
         assert [each for each in FUNCTIONS[name] if each not in parameters] == [], name

@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,7 +15,7 @@ from clfractal.device import drivers_folder, program, select
 from clfractal.integrators import surface
 from clfractal.integrators.kernel import ProgramText
 from tests.files.limits import file_size_limit
-from tests.shell import SCENE, InProcess, command, environment, works
+from tests.shell import SCENE, InProcess, command, environment, python, works
 
 INLINE = """version: 1
 camera: {{position: [0, -3, 0]}}
@@ -308,12 +307,8 @@ def test_no_device_at_all(here: Path) -> None:
         "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'old.png']; main()"
     )
     nowhere = {"OCL_ICD_VENDORS": str(here), "CLFRACTAL_DEVICE": ""}
-    ended = subprocess.run(
-        [sys.executable, "-P", "-c", code], cwd=here, env=environment(nowhere), capture_output=True, text=True
-    )
-    assert ended.returncode == 3
-    assert ended.stderr.count("\n") == 1
-    assert ended.stderr.startswith("no OpenCL device; install a driver")
+    ended = python(code, folder=here, extra=nowhere)
+    assert ended.is_one_line(3, "no OpenCL device; install a driver")
     assert untouched(here)
 
 

@@ -22,7 +22,7 @@ import clfractal
 from clfractal.files.resources import folder
 from clfractal.formulas import catalog
 from tests.makers import PICTURES
-from tests.shell import environment
+from tests.shell import environment, python, works
 
 ROOT = Path(__file__).resolve().parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").rglob("*.md"))]
@@ -104,10 +104,7 @@ def test_shell_code(page: Path, desk: Path) -> None:
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "python")], ids=name)
 def test_python_code(page: Path, desk: Path) -> None:
     text = "\n".join(blocks(page, "python"))
-    ended = subprocess.run(
-        [sys.executable, "-P", "-c", text], cwd=desk, env=environment(), capture_output=True, text=True
-    )
-    assert ended.returncode == 0, f"{text}\n{ended.stderr[-2000:]}"
+    works(python(text, folder=desk))
 
 
 @pytest.mark.parametrize("page", [page for page in PAGES if blocks(page, "yaml")], ids=name)

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import importlib.util
-import json
 import signal
 import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import Any
@@ -24,7 +22,7 @@ from clfractal.scene import given
 from clfractal.scene import load as load_module
 from clfractal.scene.load import load_scene
 from tests.calls import counted
-from tests.shell import InProcess, command, environment, works
+from tests.shell import InProcess, command, environment, python, works
 
 # Squaring quaternions without adding anything: inside is the unit ball, of which the slice is one, too.
 SCENE = """version: 1
@@ -344,7 +342,4 @@ def test_meshes_need_no_opencl_until_the_input_is_right() -> None:
         "assert run(['mesh', 'missing.yaml', '-o', 'm.ply'], Shell(owns_process=False)) == 2\n"
         "print([m for m in ('pyopencl', 'skimage', 'trimesh', 'OpenEXR') if m in sys.modules])"
     )
-    ended = subprocess.run(
-        [sys.executable, "-c", code], env=environment(), capture_output=True, text=True, check=True
-    )
-    assert json.loads(ended.stdout.splitlines()[-1].replace("'", '"')) == []
+    assert works(python(code)).out.splitlines()[-1] == "[]"

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 import struct
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,7 +16,7 @@ from clfractal.errors import ClfractalError
 from clfractal.files.film_kinds import MATROSKA, Recipe
 from clfractal.files.moving import plan_film, write_film
 from clfractal.files.png import write_png_pixels
-from tests.shell import InProcess, environment, works
+from tests.shell import Ended, InProcess, python, works
 
 # --- two eyes ---
 
@@ -165,16 +164,8 @@ assert len(seen) == 4 and all(each == before for each in seen), (before, seen)
 def test_no_thread_is_scheduled_otherwise(tmp_path: Path) -> None:
     """Also as root, who may; the same process afterwards starts usual threads, and nothing was said."""
     Image.new("RGB", (128, 96), (40, 90, 200)).save(tmp_path / "a.png")
-    ended = subprocess.run(
-        [sys.executable, "-c", WRITING],
-        env=environment() | {"PYTHONPATH": os.pathsep.join(sys.path)},
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert ended.returncode == 0, ended.stderr
-    assert ended.stderr == ""
+    ended = python(WRITING, folder=tmp_path, extra={"PYTHONPATH": os.pathsep.join(sys.path)})
+    assert ended == Ended(0, "", "")
 
 
 def test_it_is_av1_with_ten_bits(tmp_path: Path) -> None:

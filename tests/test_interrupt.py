@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import os
 import re
 import signal
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -23,7 +21,7 @@ from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes
 from tests.long_renders import ENDLESS, LIMIT_SECONDS, interrupt, interrupted_in_a_kernel
-from tests.shell import SCENE, command, environment, process, works
+from tests.shell import SCENE, Running, has_bytes, process, python, wait_until, works
 
 pytestmark = [
     pytest.mark.usefixtures("interrupts_are_not_ignored"),
@@ -64,10 +62,7 @@ def test_in_the_middle_of_a_compilation(tmp_path: Path) -> None:
     assert told.count("\n") == 1
     assert "interrupted" in told
     assert took < LIMIT_SECONDS
-    deadline = time.monotonic() + 5
-    while any(Path(f"/proc/{child}").exists() for child in children):
-        assert time.monotonic() < deadline, "the compiling child lives on"
-        time.sleep(0.01)
+    wait_until(lambda: not any(Path(f"/proc/{child}").exists() for child in children), seconds=5)
     assert {path.name for path in tmp_path.iterdir()} - {"cache", "pocl"} == {"endless.yaml"}
 
 
@@ -190,12 +185,7 @@ def test_every_call_hears_ctrl_c(tmp_path: Path) -> None:
     )
     for name, (first, long) in CALLS.items():
         code += f"{first}\nprint({name!r}, interrupted(lambda: {long}), sep=': ', flush=True)\n{first}\n"
-    command = [sys.executable, "-P", "-c", code]
-    ended = subprocess.run(
-        command, cwd=tmp_path, env=environment(), capture_output=True, text=True, timeout=200
-    )
-    assert ended.returncode == 0, ended.stderr[-3000:]
-    took = dict(line.split(": ") for line in ended.stdout.splitlines())
+    took = dict(line.split(": ") for line in works(python(code, folder=tmp_path)).out.splitlines())
     print(took)
     assert list(took) == list(CALLS)
     assert {name: seconds for name, seconds in took.items() if float(seconds) > MOST_SECONDS} == {}
@@ -215,49 +205,19 @@ animation: {frames: 40}
 """
 
 
-class Work:
-    """A command that runs, in a folder with the scene."""
-
-    def __init__(self, folder: Path, *arguments: str, before: Callable[[], object] | None = None) -> None:
-        (folder / "scene.yaml").write_text(TILED)
-        self.running = subprocess.Popen(
-            command(*arguments),
-            cwd=folder,
-            env=environment(),
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-            preexec_fn=before,
-        )
-
-    def wait_until(self, ready: Callable[[], bool]) -> None:
-        deadline = time.monotonic() + 120
-        while not ready():
-            assert self.running.poll() is None, self.running.communicate()[1]
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
-
-    def ended_by(self, *signals: signal.Signals) -> tuple[int, str]:
-        """Sends the signals; gives status and standard error."""
-        for each in signals:
-            self.running.send_signal(each)
-        try:
-            told = self.running.communicate(timeout=60)[1]
-        finally:
-            if self.running.poll() is None:
-                os.killpg(self.running.pid, signal.SIGKILL)
-        return self.running.returncode, told
+def begun(folder: Path, *arguments: str, before: Callable[[], object] | None = None) -> Running:
+    (folder / "scene.yaml").write_text(TILED)
+    return Running(folder, *arguments, before=before)
 
 
-def _has_tiles(journal: Path) -> Callable[[], bool]:
-    # (A tile of its four channels has 64 KB; before the first there is but the header.)
-    return lambda: journal.exists() and journal.stat().st_size > 100_000
+# (A tile of its four channels has 64 KB; before the first there is but the header.)
+HEADER = 100_000
 
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_render_is_continued(tmp_path: Path, sent: signal.Signals) -> None:
-    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
-    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
+    work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
     status, told = work.ended_by(sent)
     assert status == 128 + sent
     found = re.fullmatch(
@@ -288,7 +248,7 @@ def test_a_render_is_continued(tmp_path: Path, sent: signal.Signals) -> None:
 def test_long_commands(tmp_path: Path, arguments: tuple[str, ...]) -> None:
     if "--cluster" in arguments:
         pytest.importorskip("distributed")
-    work = Work(tmp_path, *arguments, "--quiet")
+    work = begun(tmp_path, *arguments, "--quiet")
     moment = time.monotonic() + 2.0
     work.wait_until(lambda: time.monotonic() > moment)
     status, told = work.ended_by(signal.SIGTERM)
@@ -307,11 +267,11 @@ def test_what_was_ignored_stays_so(tmp_path: Path) -> None:
         for each in (signal.SIGHUP, signal.SIGINT):
             signal.signal(each, signal.SIG_IGN)
 
-    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet", before=ignore)
-    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
+    work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet", before=ignore)
+    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
     before = (tmp_path / "a.exr.partial").stat().st_size
-    work.running.send_signal(signal.SIGHUP)
-    work.running.send_signal(signal.SIGINT)
+    work.process.send_signal(signal.SIGHUP)
+    work.process.send_signal(signal.SIGINT)
     work.wait_until(lambda: (tmp_path / "a.exr.partial").stat().st_size > before)
     status, told = work.ended_by(signal.SIGTERM)
     assert status == 143
@@ -319,9 +279,9 @@ def test_what_was_ignored_stays_so(tmp_path: Path) -> None:
 
 
 def test_the_first_of_several_counts(tmp_path: Path) -> None:
-    work = Work(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
-    work.wait_until(_has_tiles(tmp_path / "a.exr.partial"))
-    work.running.send_signal(signal.SIGTERM)
+    work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
+    work.process.send_signal(signal.SIGTERM)
     time.sleep(0.02)
     status, told = work.ended_by(signal.SIGHUP, signal.SIGTERM, signal.SIGINT)
     assert status == 143

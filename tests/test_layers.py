@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import re
 import statistics
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.shell import python, works
 
 ROOT = Path(__file__).resolve().parents[1]
 LONGEST_FILE = 500
@@ -81,8 +81,7 @@ def test_checking_a_scene_needs_no_opencl() -> None:
         "heavy = ('numpy', 'pyopencl', 'OpenEXR', 'rich', 'PIL', 'cmap', 'mpmath')\n"
         "print([m for m in heavy if m in sys.modules])"
     )
-    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert ended.stdout.splitlines()[-1] == "[]"
+    assert works(python(code)).out.splitlines()[-1] == "[]"
 
 
 def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> None:
@@ -95,8 +94,7 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
         "assert run(order, Shell(owns_process=False)) == 0\n"
         "print(*sys.modules)"
     )
-    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    loaded = set(ended.stdout.splitlines()[-1].split())
+    loaded = set(works(python(code)).out.splitlines()[-1].split())
     assert "clfractal.integrators.surface" in loaded
     own = {
         *("clfractal.device.buildlog", "clfractal.images.anaglyph", "clfractal.images.probe"),
@@ -120,12 +118,9 @@ def test_the_program_starts_without_what_it_does_not_need(monkeypatch: pytest.Mo
         "cli.run = lambda *_: print(gc.isenabled(), os.environ['OPENBLAS_NUM_THREADS']) or 0\n"
         "os._exit = sys.exit; cli.main()"
     )
+    monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     for given, used in (({}, "1"), ({"OPENBLAS_NUM_THREADS": "3"}, "3")):
-        monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
-        for name, value in given.items():
-            monkeypatch.setenv(name, value)
-        ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True)
-        assert ended.stdout.split() == ["False", used]
+        assert python(code, extra=given).out.split() == ["False", used]
 
 
 def test_garbage_is_collected_again_while_a_command_works(tmp_path: Path) -> None:
@@ -135,12 +130,10 @@ def test_garbage_is_collected_again_while_a_command_works(tmp_path: Path) -> Non
         "check.check_scene = lambda *_, **__: print(gc.isenabled(), gc.get_freeze_count() > 0)\n"
         "program.call(['check', 'scene.yaml'], Shell(owns_process=False))"
     )
-    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert ended.stdout.split() == ["True", "True"]
+    assert works(python(code)).out.split() == ["True", "True"]
 
 
 def test_importing_the_package_imports_nothing_else() -> None:
     heavy = "('numpy', 'pyopencl', 'yaml', 'pydantic')"
     code = f"import sys, clfractal; print([m for m in {heavy} if m in sys.modules])"
-    ended = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert ended.stdout == "[]\n"
+    assert works(python(code)).out == "[]\n"

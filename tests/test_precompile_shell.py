@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 import signal
-import subprocess
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -20,7 +19,7 @@ from clfractal.engine.precompile import library_count, library_scenes
 from clfractal.files import resources
 from clfractal.formulas import catalog
 from tests.long_renders import LIMIT_SECONDS
-from tests.shell import SCENE, Ended, InProcess, command, environment, process, works
+from tests.shell import SCENE, Ended, InProcess, Running, process, works
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
@@ -140,38 +139,22 @@ def test_a_limit_that_is_too_small_is_told(tmp_path: Path) -> None:
         (["bad.yaml"], "bad.yaml:2"),
     ],
 )
-def test_mistakes_are_one_line(
-    arguments: list[str],
-    part: str,
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    capsys: pytest.CaptureFixture[str],
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    (tmp_path / "a.yaml").write_text(SCENE)
-    (tmp_path / "bad.yaml").write_text(SCENE.replace("mandelbulb", "mandelbub"))
-    assert InProcess(capsys)("precompile", *arguments).is_one_line(2, part)
+def test_mistakes_are_one_line(arguments: list[str], part: str, here: Path, clf: InProcess) -> None:
+    (here / "a.yaml").write_text(SCENE)
+    (here / "bad.yaml").write_text(SCENE.replace("mandelbulb", "mandelbub"))
+    assert clf("precompile", *arguments).is_one_line(2, part)
 
 
 def test_an_interrupt_keeps_what_is_done(tmp_path: Path) -> None:
     lay_out(tmp_path)
-    running = subprocess.Popen(
-        command("precompile", *SCENES),
-        cwd=tmp_path,
-        env=environment(given(tmp_path)),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    programs, deadline = tmp_path / "cache" / "programs", time.monotonic() + 60
-    while not programs.exists() or len(list(programs.glob("*.bin"))) < 3:  # the window's two come first
-        assert running.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    running = Running(tmp_path, "precompile", *SCENES, extra=given(tmp_path))
+    programs = tmp_path / "cache" / "programs"
+    # (The window's two come first.)
+    running.wait_until(lambda: programs.exists() and len(list(programs.glob("*.bin"))) >= 3)
     begun = time.monotonic()
-    running.send_signal(signal.SIGINT)
-    _, told = running.communicate(timeout=60)
+    status, told = running.ended_by(signal.SIGINT)
     assert time.monotonic() - begun < LIMIT_SECONDS
-    assert running.returncode == 130
+    assert status == 130
     last = told.splitlines()[-1]
     assert re.fullmatch(r"clfractal: interrupted with \d+ of \d+ done; what is compiled is kept", last)
     kept = entries(tmp_path)

@@ -7,6 +7,7 @@ import random
 import re
 import signal
 import subprocess
+import sys
 import time
 import zlib
 from contextlib import suppress
@@ -26,7 +27,7 @@ from clfractal.files.journal import _HEAD, MAGIC
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes
 from tests.long_renders import HEAVY, TILES
-from tests.shell import SCENE, Ended, command, environment, process, works
+from tests.shell import SCENE, Ended, Running, command, environment, has_bytes, process, python, works
 from tests.variants import one_of
 
 
@@ -77,17 +78,10 @@ def test_killed_at_random_moments(seed: int, undisturbed: tuple[Path, float], tm
 def test_resuming_renders_only_what_is_missing(undisturbed: tuple[Path, float], tmp_path: Path) -> None:
     """Killed as soon as there is a tile on the disk; the statistics tell what the second run did."""
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    running = subprocess.Popen(
-        command("render", "heavy.yaml", "-o", "out.exr", "--quiet"), cwd=tmp_path, env=environment()
-    )
-    partial = tmp_path / "out.exr.partial"
-    record = 8 + 8 * 32 * 32 * 4
-    while running.poll() is None and not (partial.exists() and partial.stat().st_size > 2 * record):
-        time.sleep(0.002)
-    running.send_signal(signal.SIGKILL)
-    assert running.wait() == -signal.SIGKILL
-    ended = render(tmp_path, "--resume", "--stats", "stats.json", "--quiet")
-    assert ended == Ended(0, "", "")
+    running = Running(tmp_path, "render", "heavy.yaml", "-o", "out.exr", "--quiet")
+    running.wait_until(has_bytes(tmp_path / "out.exr.partial", 2 * (8 + 8 * 32 * 32 * 4)))
+    assert running.ended_by(signal.SIGKILL)[0] == -signal.SIGKILL
+    assert render(tmp_path, "--resume", "--stats", "stats.json", "--quiet") == Ended(0, "", "")
     stats = json.loads((tmp_path / "stats.json").read_text())
     assert stats["tiles"] == TILES
     assert 1 <= stats["tiles_resumed"] < TILES
@@ -104,9 +98,7 @@ def interrupted(folder: Path) -> None:
         "finish.save_outputs = lambda *a, **k: full()\n"
         "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'a.png', '--quiet']; main()"
     )
-    python = command()[0]
-    ended = subprocess.run([python, "-P", "-c", code], cwd=folder, env=environment(), check=False)
-    assert ended.returncode == 2
+    assert python(code, folder=folder).status == 2
     assert (folder / "a.png.partial").exists()
 
 
@@ -171,20 +163,15 @@ def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:
 
 def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    running = subprocess.Popen(
-        command("render", "heavy.yaml", "-o", "out.exr", "--quiet"), cwd=tmp_path, env=environment()
-    )
+    running = Running(tmp_path, "render", "heavy.yaml", "-o", "out.exr", "--quiet")
     try:
-        while not (tmp_path / "out.exr.partial").exists():
-            assert running.poll() is None
-            time.sleep(0.002)
-        running.send_signal(signal.SIGSTOP)
+        running.wait_until((tmp_path / "out.exr.partial").exists)
+        running.process.send_signal(signal.SIGSTOP)
         # (Its work is not discarded, and nothing else is said.)
         ended = process(["render", "heavy.yaml", "-o", "out.exr"], tmp_path)
         assert ended.is_one_line(2, "out.exr.partial: is in use")
     finally:
-        running.send_signal(signal.SIGCONT)
-        assert running.wait() == 0
+        assert running.ended_by(signal.SIGCONT)[0] == 0
 
 
 # --- both eyes ---
@@ -227,21 +214,9 @@ def undisturbed_pair(tmp_path_factory: pytest.TempPathFactory) -> dict[str, byte
 def stopped(folder: Path, number: signal.Signals, side: str) -> tuple[int, str]:
     """A render that gets a signal as soon as some of an eye's tiles are on the disk: status, and standard error."""
     (folder / "heavy.yaml").write_text(PAIR)
-    running = subprocess.Popen(
-        [command()[0], "-P", "-c", SLOWLY],
-        cwd=folder,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
-    record = 8 * 32 * 32 * 4
-    while running.poll() is None:
-        if (folder / side).exists() and (folder / side).stat().st_size > record:
-            running.send_signal(number)
-            break
-        time.sleep(0.001)
-    _, told = running.communicate(timeout=60)
-    return running.returncode, told
+    running = Running(folder, words=[sys.executable, "-P", "-c", SLOWLY])
+    running.wait_until(has_bytes(folder / side, 8 * 32 * 32 * 4))
+    return running.ended_by(number)
 
 
 @pytest.mark.parametrize("side", [LEFT, RIGHT])

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from tests.shell import command, environment
+from tests.shell import command, environment, has_bytes, wait_until
 
 # Work of some ten seconds of one core, in tiles of a tenth of a second.
 HEAVY = """version: 1
@@ -183,10 +183,4 @@ class Client:
 
 def journal_grows(folder: Path, name: str = "out.exr.partial", least: int = 1, seconds: float = 60) -> None:
     """Waits until some tiles lie in a journal."""
-    deadline = time.monotonic() + seconds
-    while time.monotonic() < deadline:
-        path = folder / name
-        if path.exists() and path.stat().st_size > 30_000 * least:
-            return
-        time.sleep(0.05)
-    raise AssertionError(f"nothing came into {name}")
+    wait_until(has_bytes(folder / name, 30_000 * least), seconds=seconds)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +11,7 @@ import pytest
 
 from clfractal.device import cache_folder
 from clfractal.errors import CacheWarning, FileError
-from tests.shell import SCENE, environment, process
+from tests.shell import SCENE, process, python, works
 
 # Builds a program and launches it, with nothing of ours in the way; tells the folders in use.
 PROGRAM = """
@@ -47,23 +45,18 @@ print(json.dumps({
 LOST = ("CLFRACTAL_CACHE", "POCL_CACHE_DIR", "XDG_CACHE_HOME")
 
 
-def without(variables: dict[str, str], temporary: Path) -> dict[str, str]:
-    """The environment without folders but those given and the temporary one."""
+def without(variables: dict[str, str], temporary: Path, patch: pytest.MonkeyPatch) -> dict[str, str]:
+    """An environment without folders but those given and the temporary one."""
     temporary.mkdir(exist_ok=True)
-    plain = {name: value for name, value in environment().items() if name not in LOST}
-    return plain | {"TMPDIR": str(temporary), "TEMP": str(temporary), **variables}
+    for name in LOST:
+        patch.delenv(name, raising=False)
+    return {"TMPDIR": str(temporary), "TEMP": str(temporary), **variables}
 
 
 def run(variables: dict[str, str], temporary: Path) -> dict[str, Any]:
-    ended = subprocess.run(
-        [sys.executable, "-c", PROGRAM],
-        env=without(variables, temporary),
-        capture_output=True,
-        text=True,
-        timeout=120,
-    )
-    assert ended.returncode == 0, ended.stderr
-    found: dict[str, Any] = json.loads(ended.stdout)
+    with pytest.MonkeyPatch.context() as patch:
+        ended = python(PROGRAM, extra=without(variables, temporary, patch))
+    found: dict[str, Any] = json.loads(works(ended).out)
     return found
 
 
@@ -145,21 +138,13 @@ def test_no_temporary_folder_either(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 
 @posix
-def test_the_shell_tells_it(tmp_path: Path) -> None:
+def test_the_shell_tells_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "scene.yaml").write_text(SCENE + "renderer: {type: cut_plane}\n")  # one program
     (tmp_path / "file").touch()
     own = {"HOME": str(tmp_path / "file"), "CLFRACTAL_LANES": "1"}
-    whole = without(own, tmp_path / "tmp")
-    ended = subprocess.run(
-        [sys.executable, "-P", "-m", "clfractal", "render", "scene.yaml"],
-        cwd=tmp_path,
-        env=whole,
-        capture_output=True,
-        text=True,
-        timeout=240,
-    )
-    assert ended.returncode == 0, ended.stderr
-    told = [line for line in ended.stderr.splitlines() if "cache folder" in line]
+    extra = without(own, tmp_path / "tmp", monkeypatch)
+    ended = works(process(["render", "scene.yaml"], tmp_path, extra))
+    told = [line for line in ended.err.splitlines() if "cache folder" in line]
     assert len(told) == 1
     assert told[0].startswith(
         f"the cache folder '{tmp_path}/file/.cache/clfractal' cannot be used: Not a dir"

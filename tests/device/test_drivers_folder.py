@@ -19,7 +19,7 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.program import build
 from clfractal.device.select import Device, is_pocl
 from clfractal.errors import FileError
-from tests.shell import environment
+from tests.shell import Running, environment
 
 # A process that has the folder, says so, and waits.
 HOLDER = """
@@ -167,17 +167,11 @@ def test_it_goes_with_an_interrupt(tmp_path: Path) -> None:
         "camera: {position: [0, -3, 0]}\nrenderer: {samples: 4096}\n"
     )
     (tmp_path / "tmp").mkdir()
-    command = [sys.executable, "-P", "-m", "clfractal", "render", "scene.yaml", "-o", "a.exr", "--quiet"]
-    extra = environment({"TMPDIR": str(tmp_path / "tmp")})
-    running = subprocess.Popen(command, cwd=tmp_path, env=extra, stderr=subprocess.DEVNULL)
-    deadline = time.monotonic() + 120
-    while not (tmp_path / "a.exr.partial").exists():
-        assert running.poll() is None
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    order = ("render", "scene.yaml", "-o", "a.exr", "--quiet")
+    running = Running(tmp_path, *order, extra={"TMPDIR": str(tmp_path / "tmp")})
+    running.wait_until((tmp_path / "a.exr.partial").exists)
     assert list((tmp_path / "tmp").rglob("*.lock"))
-    running.send_signal(signal.SIGTERM)
-    assert running.wait(20) == 143
+    assert running.ended_by(signal.SIGTERM)[0] == 143
     assert [path.name for path in (tmp_path / "tmp").rglob("*") if path.name != "running"] == [
         path.name for path in (tmp_path / "tmp").iterdir()
     ]

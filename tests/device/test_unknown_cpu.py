@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import struct
-import subprocess
 import sys
 from pathlib import Path
 
@@ -14,6 +13,7 @@ from clfractal.device import unknown_cpu
 from clfractal.device.select import devices as all_devices
 from clfractal.device.select import is_pocl
 from clfractal.device.unknown_cpu import nearest_known, place_of_name, processor_features
+from tests.shell import python, works
 
 TRIPLE = b"x86_64-unknown-linux-gnu"
 
@@ -106,7 +106,4 @@ def test_every_pocl_device_compiles() -> None:
     )
     found = [info.index for info in all_devices() if is_pocl(info)]
     for index in found:
-        ended = subprocess.run(
-            [sys.executable, "-c", program, index], capture_output=True, text=True, check=False
-        )
-        assert ended.returncode == 0, ended.stderr
+        works(python(program, index))

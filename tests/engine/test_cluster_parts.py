@@ -21,7 +21,7 @@ from clfractal.cluster.message import Array, Digests, pack, unpack
 from clfractal.cluster.sizes import SECONDS, Pace
 from clfractal.engine.engine import Engine
 from clfractal.errors import SceneError
-from tests.shell import SCENE, InProcess, environment
+from tests.shell import InProcess, environment
 
 
 @pytest.mark.parametrize(
@@ -60,16 +60,11 @@ def test_any_text_is_a_place_or_refused(text: str) -> None:
     assert Place.of(str(place)) == place
 
 
-def test_the_option_is_named(
-    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.chdir(tmp_path)
-    Path("scene.yaml").write_text(SCENE)
-    shell = InProcess(capsys)
-    ended = shell("render", "scene.yaml", "-o", "out.png", "--cluster", "locale:4")
+def test_the_option_is_named(clf: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ended = clf("render", "scene.yaml", "-o", "out.png", "--cluster", "locale:4")
     assert ended.is_one_line(2, "--cluster: must be a scheduler such as tcp://HOST:8786, or local:N")
     monkeypatch.setitem(sys.modules, "distributed", None)
-    ended = shell("render", "scene.yaml", "-o", "out.png", "--cluster", "local:1")
+    ended = clf("render", "scene.yaml", "-o", "out.png", "--cluster", "local:1")
     assert ended.is_one_line(2, "--cluster: needs the package distributed: pip install 'clfractal[cluster]'")
     assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.yaml"]
 
@@ -158,13 +153,17 @@ PROGRAM = """import clfractal
 """
 
 
+def run(*words: str, folder: Path) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        [sys.executable, "-P", *words], cwd=folder, env=environment(), capture_output=True, text=True
+    )
+
+
 @pytest.mark.parametrize("line", ["", "if True:", "if cluster := 3:"])
 def test_a_program_without_its_guard_is_told_in_a_line(line: str, tmp_path: Path) -> None:
     """Nothing is started: neither processes, nor what they would write."""
     (tmp_path / "program.py").write_text(PROGRAM.format(line=line, indent="    " if line else ""))
-    ended = subprocess.run(
-        [sys.executable, "-P", "program.py"], cwd=tmp_path, env=environment(), capture_output=True, text=True
-    )
+    ended = run("program.py", folder=tmp_path)
     assert ended.returncode == 1
     assert ended.stderr.count("\n") < 12
     assert "distributed" not in ended.stderr
@@ -188,9 +187,7 @@ def test_a_program_with_a_guard_may_start_processes(text: str, tmp_path: Path) -
         ["program.py"],
         ["-c", "from clfractal.cluster.guard import check_main; check_main('local:1')"],
     ):
-        ended = subprocess.run(
-            [sys.executable, "-P", *how], cwd=tmp_path, env=environment(), capture_output=True, text=True
-        )
+        ended = run(*how, folder=tmp_path)
         assert (ended.returncode, ended.stderr) == (0, "")
 
 

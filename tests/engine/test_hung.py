@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -31,7 +30,7 @@ from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
 from tests.long_renders import PROMISE_SECONDS
-from tests.shell import environment
+from tests.shell import Running
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
@@ -262,22 +261,15 @@ main()
 """
 
 
-def started(folder: Path, patience: float, *options: str) -> subprocess.Popen[str]:
+def started(folder: Path, patience: float) -> Running:
     (folder / "scene.yaml").write_text(SCENE)
-    given = ["render", "scene.yaml", "-o", "out.exr", "--device", halves_of(choose()), *options]
-    return subprocess.Popen(
-        [sys.executable, "-P", "-c", PROGRAM, str(patience), *given],
-        cwd=folder,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    given = ["render", "scene.yaml", "-o", "out.exr", "--device", halves_of(choose())]
+    return Running(folder, words=[sys.executable, "-P", "-c", PROGRAM, str(patience), *given])
 
 
 def test_the_program_ends_although_a_thread_hangs(whole: Framebuffer, tmp_path: Path) -> None:
-    running = started(tmp_path, 1.0)
-    _, told = running.communicate(timeout=60)
-    assert running.returncode == 0, told
+    status, told = started(tmp_path, 1.0).ended_by()
+    assert status == 0, told
     assert "is left out, others do its work: " in told
     planes = read_exr(tmp_path / "out.exr")[0]
     np.testing.assert_array_equal(planes["Z"], whole["Z"])
@@ -288,17 +280,12 @@ def test_ctrl_c_while_a_device_hangs(tmp_path: Path) -> None:
     seconds = []
     for _ in range(3):
         running = started(tmp_path, 1000.0)
-        deadline = time.monotonic() + 60
-        while not (tmp_path / "hangs").exists():
-            assert running.poll() is None, running.communicate()[1]
-            assert time.monotonic() < deadline
-            time.sleep(0.01)
+        running.wait_until((tmp_path / "hangs").exists)
         time.sleep(1.0)  # the other one has done all that it can
         begin = time.monotonic()
-        running.send_signal(signal.SIGINT)
-        _, told = running.communicate(timeout=30)
+        status, told = running.ended_by(signal.SIGINT)
         seconds.append(time.monotonic() - begin)
-        assert running.returncode == 130, told
+        assert status == 130, told
         assert (tmp_path / "out.exr.partial").exists()
         (tmp_path / "hangs").unlink()
     assert min(seconds) < PROMISE_SECONDS

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import pkgutil
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import clfractal
 from clfractal.device import bundled
 from clfractal.device.advice import install_hint
 from clfractal.files.document import read_document
-from tests.shell import SCENE
+from tests.shell import SCENE, python, works
 
 # Modules and calls that Windows has not, hidden before the package is imported. (NumPy, pyopencl and Python's own
 # parts were built for this system, so they come first.)
@@ -49,17 +46,7 @@ sys.platform = "linux"
 
 def run(text: str, folder: Path) -> str:
     """The output of Python text in a process where nothing of POSIX alone is left."""
-    paths = [str(Path(clfractal.__file__).resolve().parents[1]), os.environ.get("PYTHONPATH", "")]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, paths))}
-    ended = subprocess.run(
-        [sys.executable, "-P", "-c", HIDE + WINDOWS_FILES + text],
-        cwd=folder,
-        env=environment,
-        capture_output=True,
-        text=True,
-    )
-    assert ended.returncode == 0, ended.stderr[-3000:]
-    return ended.stdout
+    return works(python(HIDE + WINDOWS_FILES + text, folder=folder)).out
 
 
 def test_every_module_is_imported_without_posix(tmp_path: Path) -> None:
