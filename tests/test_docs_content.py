@@ -12,6 +12,7 @@ import os
 import posixpath
 import re
 import shlex
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -32,9 +33,11 @@ from clfractal.formulas import definition as model
 from clfractal.integrators import lanes
 from clfractal.scene import environment, lighting, load, palettes, parts
 from clfractal.viewer import settings
+from clfractal.viewer.keys import KeyMap
+from clfractal.viewer.settings import Settings
 from tests.document import DOCS, PAGES, code, section, table, text
 from tests.makers import maker
-from tests.shell import SCENE, InProcess
+from tests.shell import SCENE, InProcess, process, works
 
 PACKAGE = Path(clfractal.__file__).resolve().parent
 
@@ -98,16 +101,13 @@ def test_reserved_names_are_told() -> None:
     assert build._RESERVED - set(nodes.FUNCTIONS) <= told
 
 
-def test_the_message_about_the_formula_of_the_tutorial(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_message_about_the_formula_of_the_tutorial(here: Path, clf: InProcess) -> None:
     page = section("formulas.md", "A formula of one's own")
     for name, content in re.findall(r"^cat > (\S+) <<'END'\n(.*?)^END$", page, re.M | re.S):
-        (tmp_path / name).write_text(content.replace("re*cos(turn) - im", "re*cos(trn) - im"))
-    monkeypatch.chdir(tmp_path)
+        (here / name).write_text(content.replace("re*cos(turn) - im", "re*cos(trn) - im"))
     told = re.search(r"`(tricorn\.yaml:.*)`\.", page)
     assert told
-    assert InProcess(capsys)("check", "scene.yaml").err == told[1] + "\n"
+    assert clf("check", "scene.yaml").err == told[1] + "\n"
 
 
 def test_limits_of_formulas() -> None:
@@ -178,15 +178,10 @@ def test_environment_variables() -> None:
 
 
 @pytest.mark.parametrize("row", table("command-line.md", "Messages"), ids=lambda row: str(row[0]))
-def test_messages(
-    row: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_messages(row: list[str], here: Path, clf: InProcess) -> None:
     """Each mistake of the table, tried; the scene is in `scene.yaml`."""
-    (tmp_path / "scene.yaml").write_text(
-        section("command-line.md", "Messages").split("```")[1].split("\n", 1)[1]
-    )
-    monkeypatch.chdir(tmp_path)
-    ended = InProcess(capsys)(*shlex.split(code(row[0]))[1:])
+    (here / "scene.yaml").write_text(section("command-line.md", "Messages").split("```")[1].split("\n", 1)[1])
+    ended = clf(*shlex.split(code(row[0]))[1:])
     assert ended.err == code(row[1]) + "\n"
     assert ended.status == errors.STATUS_BAD_INPUT
 
@@ -197,21 +192,10 @@ def test_messages(
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with a.exr, a.png and stats.json."""
-    from clfractal.cli import run
-    from clfractal.cli.shell import Shell
-
     folder = tmp_path_factory.mktemp("rendered")
     (folder / "scene.yaml").write_text(SCENE)
-    outputs = (
-        "-o",
-        str(folder / "a.exr"),
-        "-o",
-        str(folder / "a.png"),
-        "--stats",
-        str(folder / "stats.json"),
-    )
-    status = run(["render", str(folder / "scene.yaml"), "--quiet", *outputs], Shell(owns_process=False))
-    assert status == 0
+    outputs = ("-o", "a.exr", "-o", "a.png", "--stats", "stats.json")
+    works(process(["render", "scene.yaml", "--quiet", *outputs], folder))
     return folder
 
 
@@ -304,3 +288,40 @@ def test_every_file_says_in_one_breath_what_it_is_for() -> None:
         assert purpose(path).endswith("."), path
     for path in (DOCS.parent / "kernels").rglob("*.[ch]*"):
         assert purpose(path), path
+
+
+# --- the window ---
+
+
+def test_the_table_of_keys() -> None:
+    told = [tuple(row) for row in table("window.md", "Keys")]
+    assert told == KeyMap.defaults().help_rows()
+
+
+def shown(value: Any) -> str:
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value:g}" if isinstance(value, int | float) else str(value)
+
+
+def test_the_table_of_settings() -> None:
+    expected = []
+    for field in fields(Settings):
+        rules = field.metadata
+        if field.name == "keys":
+            expected.append([f"`{field.name}`", "`{}`", "actions and keys", rules["told"]])
+            continue
+        bounds = f"{rules['least']:g} to {rules['most']:g}" if "least" in rules else ""
+        words = bounds or " or ".join(rules.get("words") or ()) or "true or false"
+        expected.append([f"`{field.name}`", f"`{shown(field.default)}`", words, rules["told"]])
+    assert table("window.md", "Settings") == expected
+
+
+def test_every_gesture_of_the_help_is_told() -> None:
+    pytest.importorskip("imgui_bundle")
+    from clfractal.viewer.panels.help import POINTER_ROWS
+
+    page = (DOCS / "window.md").read_text(encoding="utf-8").lower()
+    for gesture, _ in POINTER_ROWS:
+        first = gesture.split(":")[0].split("+")[0].split()[-1].lower()
+        assert first in page, gesture

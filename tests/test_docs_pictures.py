@@ -1,13 +1,119 @@
-"""The pictures of docs/ that show what settings do: each row of their table has its file, and its place on a page."""
+"""Pictures of docs/: the gallery's are as good as 200 KB allow; each that a page shows is there, small, made as it says."""
 
 from __future__ import annotations
 
+import io
+import re
+from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from tests.makers import DOCS, maker, pictured
+
+
+@pytest.fixture(scope="module")
+def gallery() -> Any:
+    """docs/make_gallery.py"""
+    return maker("make_gallery")
+
+
+def noise(amount: float, size: tuple[int, int] = (720, 1280), components: int = 3) -> Any:
+    """A slope with noise over it: the more noise, the larger the file."""
+    random = np.random.default_rng(1)
+    slope = np.linspace(0, 0.5, size[1], dtype=np.float32)[None, :, None]
+    return np.clip(slope + amount * random.random((*size, components), np.float32), 0, 1)
+
+
+@pytest.mark.parametrize("amount", [0.0, 0.05, 0.2])
+def test_the_best_quality_that_is_small_enough(gallery: Any, amount: float) -> None:
+    shown = gallery.picture(noise(amount), np.ones((720, 1280, 1), np.float32))
+    content, quality = gallery.small_enough(shown)
+    assert len(content) <= gallery.LARGEST_FILE == 200_000
+    assert quality in gallery.QUALITIES
+    assert quality == gallery.QUALITIES[-1] or len(gallery.webp(shown, quality + 1)) > gallery.LARGEST_FILE
+    with Image.open(io.BytesIO(content)) as read:
+        assert (read.format, read.size, read.mode) == ("WEBP", (1280, 720), "RGB")
+
+
+def test_what_cannot_be_made_small_enough(gallery: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(gallery, "LARGEST_FILE", 2_000)
+    shown = gallery.picture(noise(0.5), np.ones((720, 1280, 1), np.float32))
+    with pytest.raises(ValueError, match="is larger than 2 kB even at quality 25"):
+        gallery.small_enough(shown)
+
+
+def test_transparent_pictures_stay_so(gallery: Any) -> None:
+    coverage = np.ones((720, 1280, 1), np.float32)
+    coverage[:, :640] = 0
+    content, _ = gallery.small_enough(gallery.picture(noise(0.05) * coverage, coverage))
+    with Image.open(io.BytesIO(content)) as read:
+        alpha = np.asarray(read.convert("RGBA"))[..., 3]
+    assert (alpha[:, :600] == 0).all()
+    assert (alpha[:, 680:] == 255).all()
+
+
+@pytest.mark.parametrize(
+    ("rows", "columns", "shape"),
+    [(1080, 1920, (720, 1280)), (2048, 2048, (1280, 1280)), (300, 400, (300, 400))],
+)
+def test_reduced_in_linear_light(gallery: Any, rows: int, columns: int, shape: tuple[int, int]) -> None:
+    linear = np.zeros((rows, columns, 3), np.float32)
+    linear[:, ::2] = (1, 0.5, 0.25)
+    found = gallery.reduced(linear, gallery.WIDTH)
+    assert found.shape == (*shape, 3)
+    assert found.dtype == np.float32
+    assert found.mean(axis=(0, 1)) == pytest.approx([0.5, 0.25, 0.125], rel=0.01)
+    assert (found >= 0).all()
+    assert (found <= 1).all()
+
+
+def test_pages_show_the_format_that_is_there(
+    gallery: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(gallery, "PICTURES", tmp_path)
+    (tmp_path / "old.png").touch()
+    for name in ("new.webp", "both.webp", "both.png"):
+        (tmp_path / name).touch()
+    text = "![a](docs/pictures/old.png) ![b](pictures/new.png) ![c](pictures/both.png) `a.png`"
+    assert gallery.relinked(text) == (
+        "![a](docs/pictures/old.png) ![b](pictures/new.webp) ![c](pictures/both.webp) `a.png`"
+    )
+    assert gallery.file_of("never_made").name == "never_made.webp"
+
+
+def test_the_page_is_made_of_the_scenes(gallery: Any) -> None:
+    """Its pictures are there, in one of the formats; those made since the size rule holds follow it."""
+    page = (DOCS / "gallery.md").read_text("utf-8")
+    for scene in gallery.scene_paths():
+        file = gallery.file_of(scene.stem)
+        if file.exists():
+            assert f"](pictures/{file.name})" in page
+        if file.suffix == ".webp" and file.exists():
+            assert file.stat().st_size <= gallery.LARGEST_FILE
+            with Image.open(file) as shown:
+                assert shown.width == gallery.WIDTH
+
+
+def test_the_showcase_tells_how_each_print_is_made() -> None:
+    page = (DOCS / "showcase.md").read_text("utf-8")
+    parts = page.split("\n## ")[1:]
+    assert len(parts) >= 3
+    for part in parts:
+        (scene,) = re.findall(r"\]\(\.\./scenes/(\w+)\.yaml\)", part)
+        assert (DOCS.parent / "scenes" / f"{scene}.yaml").is_file()
+        assert f"](pictures/{scene}.webp)" in part
+        (command,) = re.findall(r"```text\n(.*)\n```", part)
+        told = re.fullmatch(rf"clfractal render scenes/{scene}\.yaml -o \w+\.png --size (\d+)x(\d+)", command)
+        assert told, command
+        assert int(told[1]) >= 3840
+        assert int(told[2]) >= 2160
+
+
+# --- what settings do ---
+
 
 each_picture = pytest.mark.parametrize(
     "picture", maker("make_pictures").table(), ids=lambda picture: str(picture.name)
@@ -34,3 +140,32 @@ def test_its_panels_differ(picture: Any) -> None:
         == len(picture.panels)
         > 1
     )
+
+
+# --- the tutorial ---
+
+
+PAGE = (DOCS / "tutorial.md").read_text("utf-8")
+NAMES = re.findall(r"\]\(pictures/tutorial_(\w+)\.webp\)", PAGE)
+
+
+def test_the_tutorial_has_pictures() -> None:
+    assert len(NAMES) >= 10
+    assert len(set(NAMES)) == len(NAMES)
+
+
+@pictured
+@pytest.mark.parametrize("name", NAMES)
+def test_a_picture_of_the_tutorial(name: str) -> None:
+    assert f"-o {name}.png" in PAGE
+    file = DOCS / "pictures" / f"tutorial_{name}.webp"
+    assert file.stat().st_size <= 200_000
+    with Image.open(file) as shown:
+        assert shown.width <= 1280
+
+
+@pictured
+def test_no_picture_is_left_over() -> None:
+    assert {file.stem for file in (DOCS / "pictures").glob("tutorial_*")} == {
+        f"tutorial_{name}" for name in NAMES
+    }

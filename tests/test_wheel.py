@@ -1,17 +1,48 @@
-"""The program as it is installed: with its kernels, scenes and formulas, and nothing from the checkout."""
+"""The program as it is installed, with kernels, scenes and formulas; and the source archive, which builds and tests it."""
 
 from __future__ import annotations
 
 import os
+import shutil
 import subprocess
 import sys
+import tarfile
+import zipfile
 from pathlib import Path
 
 import pytest
 
 import clfractal
 from tests.shell import SCENE
-from tests.wheels import ROOT, built_wheel, names_in, run
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+def run(*command: str | Path, folder: Path) -> str:
+    """Runs a command in a folder without anything that leads to the checkout; gives its standard output."""
+    clean = {name: value for name, value in os.environ.items() if name not in ("PYTHONPATH", "VIRTUAL_ENV")}
+    ended = subprocess.run(list(map(str, command)), cwd=folder, env=clean, capture_output=True, text=True)
+    assert ended.returncode == 0, ended.stderr[-2000:]
+    return ended.stdout
+
+
+def built_wheel(source: Path, folder: Path) -> Path:
+    """The wheel of a folder with sources, built in another folder."""
+    run(
+        *(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--no-build-isolation"),
+        *("--wheel-dir", folder, source),
+        folder=folder,
+    )
+    (found,) = folder.glob("*.whl")
+    return found
+
+
+def names_in(wheel: Path) -> set[str]:
+    """The files in a wheel."""
+    return set(zipfile.ZipFile(wheel).namelist())
+
+
+# --- the wheel ---
 
 
 @pytest.fixture(scope="module")
@@ -77,3 +108,69 @@ def test_the_tests_run_on_the_installed_program() -> None:
     """`make test` promises it; elsewhere (a developer's own pytest) the checkout is tested."""
     if os.environ.get("CLFRACTAL_EXPECT_INSTALLED"):
         assert not Path(clfractal.__file__).resolve().is_relative_to(ROOT / "clfractal")
+
+
+# --- the source archive ---
+
+
+LARGEST = 5_000_000
+"""Bytes; the pictures of the pages alone are thirty millions."""
+
+
+@pytest.fixture(scope="module")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The archive of the checkout, in which an editor or a merge has left files behind."""
+    from hatchling.builders.sdist import SdistBuilder
+
+    folder = tmp_path_factory.mktemp("sdist")
+    checkout = folder / "checkout"
+    left_out = shutil.ignore_patterns(".*", "build", "out", "__pycache__")
+    shutil.copytree(ROOT, checkout, ignore=left_out)
+    (checkout / "docs" / "pictures").mkdir(exist_ok=True)
+    for name in ("docs/pictures/a.webp", "docs/pictures.yaml.orig", "kernels/march.cl.rej"):
+        (checkout / name).write_text("left behind")
+    (file,) = SdistBuilder(str(checkout)).build(directory=str(folder / "dist"))
+    return Path(file)
+
+
+def inside(archive: Path) -> set[str]:
+    with tarfile.open(archive) as opened:
+        return {name.partition("/")[2] for name in opened.getnames()}
+
+
+def test_what_belongs_in_it(archive: Path) -> None:
+    names = inside(archive)
+    for folder, ending in (
+        ("clfractal", "py"),
+        ("kernels", "*"),
+        ("scenes", "yaml"),
+        ("tests", "py"),
+        ("benchmarks", "py"),
+        ("docs", "md"),
+        ("docs", "py"),
+    ):
+        wanted = {str(path.relative_to(ROOT).as_posix()) for path in (ROOT / folder).rglob(f"*.{ending}")}
+        assert wanted, folder
+        assert wanted <= names, wanted - names
+    assert {"pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "LICENSE", "docs/clfractal.1"} <= names
+    assert not [name for name in names if name.startswith("docs/pictures/")]
+    assert not [name for name in names if name.endswith((".orig", ".rej", ".partial", ".pyc"))]
+    assert archive.stat().st_size <= LARGEST
+
+
+def test_the_wheel_of_an_archive_is_that_of_the_checkout(archive: Path, tmp_path: Path) -> None:
+    with tarfile.open(archive) as opened:
+        opened.extractall(tmp_path, filter="data")
+    (unpacked,) = tmp_path.iterdir()
+    (tmp_path / "a").mkdir()
+    (tmp_path / "b").mkdir()
+    assert names_in(built_wheel(unpacked, tmp_path / "a")) == names_in(built_wheel(ROOT, tmp_path / "b"))
+
+
+def test_no_leftovers_are_tracked() -> None:
+    if not (ROOT / ".git").exists():
+        pytest.skip("no checkout")
+    listed = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True)
+    if listed.returncode:
+        pytest.skip("no git")
+    assert not [name for name in listed.stdout.splitlines() if name.endswith((".orig", ".rej", ".partial"))]
