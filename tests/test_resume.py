@@ -30,6 +30,8 @@ from tests.long_renders import HEAVY, TILES
 from tests.shell import SCENE, Ended, Running, command, environment, has_bytes, process, python, works
 from tests.variants import one_of
 
+pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
+
 
 def render(folder: Path, *options: str) -> Ended:
     return process(["render", "heavy.yaml", "-o", "out.exr", *options], folder)
@@ -176,8 +178,6 @@ def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
 
 # --- both eyes ---
 
-
-pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
 # (The program of the other file of this kind: its text does not depend on the picture's size.)
 PAIR = HEAVY.replace("width: 224, height: 160", "width: 128, height: 96") + "stereo: {separation: 0.3}\n"

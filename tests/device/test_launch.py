@@ -1,7 +1,10 @@
-"""Launches in parts: every thing once, whatever the parts, and an interrupt between them."""
+"""Launches in parts, once for every thing; work-groups as large as a device takes them; lane counts."""
 
 from __future__ import annotations
 
+import dataclasses
+from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,10 +12,14 @@ import numpy.typing as npt
 import pyopencl as cl
 import pytest
 
-from clfractal.device import launch
+from clfractal.device import cache, child, groups, launch, tune
 from clfractal.device.launch import run_in_parts
+from clfractal.device.peak import fma_peak
 from clfractal.device.program import build, math_flags
-from clfractal.device.select import Device
+from clfractal.device.select import Device, choose, has_float64
+from clfractal.errors import DeviceError
+from tests.portability.lane_counts import accepted_in_use, counts_in_use
+from tests.portability.pictures import TINY_SIZE, picture
 
 TEXT = """
 __kernel void count(__global int *times, int first, int count) {
@@ -75,3 +82,137 @@ def test_an_interrupt_ends_the_parts(device: Device) -> None:
         counter.run(first_part=10, done=stop)
     assert told == [10]
     device.queue.finish()
+
+
+# --- work-groups ---
+
+
+def fitting(group: tuple[int, ...], most: int, longest: tuple[int, ...]) -> tuple[int, ...]:
+    """Of a device with these limits."""
+    device: Any = SimpleNamespace(cl_device=SimpleNamespace(max_work_item_sizes=list(longest)))
+    kernel: Any = SimpleNamespace(get_work_group_info=lambda what, of: most)
+    return groups.fitting(device, kernel, group)
+
+
+@pytest.mark.parametrize(
+    ("group", "most", "longest", "expected"),
+    [
+        ((32, 8), 256, (1024, 1024, 64), (32, 8)),
+        ((1, 16), 1024, (1024, 1, 1), (1, 1)),  # Apple's CPU device
+        ((32, 8), 1024, (1024, 1, 1), (32, 1)),
+        ((32, 8), 64, (1024, 1024, 64), (8, 8)),
+        ((64, 1), 1, (4096, 4096, 4096), (1, 1)),
+        ((64,), 32, (16, 16, 16), (16,)),
+        ((1, 64), 0, (0, 0, 0), (1, 1)),  # nonsense of a driver
+    ],
+)
+def test_as_large_as_the_device_takes(
+    group: tuple[int, ...], most: int, longest: tuple[int, ...], expected: tuple[int, ...]
+) -> None:
+    assert fitting(group, most, longest) == expected
+
+
+@pytest.mark.parametrize("name", ["mandelbox", "coverage"])
+def test_pictures_do_not_depend_on_groups(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A surface, and a volume with all that fills it."""
+    device = choose()
+    usual = picture(device, name, "float32", TINY_SIZE)
+    asked = []
+
+    def one_dimension(device: Any, kernel: Any) -> tuple[int, tuple[int, ...]]:
+        asked.append(kernel.function_name)
+        return 2, (1024, 1, 1)
+
+    monkeypatch.setattr(groups, "_limits", one_dimension)
+    device.loaded.clear()  # and with them the kernels that know their groups
+    assert np.array_equal(picture(device, name, "float32", TINY_SIZE), usual, equal_nan=True)
+    device.loaded.clear()
+    assert len(set(asked)) >= {"mandelbox": 1, "coverage": 3}[name]
+
+
+# --- lane counts, and the measured peak ---
+
+
+_HERE = "tests.device.test_tune"
+
+
+def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
+    """A trial in which 4 lanes compute nonsense."""
+    return {"fault": "nonsense" if request["lanes"] == 4 else ""}
+
+
+def wide_numbers_job(request: dict[str, Any]) -> dict[str, Any]:
+    """A trial in which float64 computes nonsense."""
+    return {"fault": "nonsense" if request["precision"] == "float64" else ""}
+
+
+@pytest.fixture
+def _rigged(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:rigged_job")
+
+
+@pytest.mark.conformance
+def test_this_device_computes_rightly_with_every_accepted_lane_count(
+    device: Device, empty_cache: Path
+) -> None:
+    """At least scalars and small packets must work anywhere."""
+    counts = counts_in_use(device)
+    assert {1, 4, 8}.intersection(counts) <= set(accepted_in_use(device, "float32"))
+    if has_float64(device.info):
+        assert tune.lane_reports(device, "float64", (4 if 4 in counts else 1,))[0].fault == ""
+
+
+@pytest.mark.conformance
+@pytest.mark.usefixtures("_rigged")
+def test_a_lane_count_that_computes_nonsense_or_aborts_is_left_out(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv(child.TEST_ABORT, "trying 16 lanes")
+    assert tune.accepted_lanes(device, "float32") == (1, 8)
+    reports = tune.lane_reports(device, "float32", (4, 16))
+    assert reports[0].fault == "nonsense"
+    assert not reports[1].accepted
+    assert "the driver aborted (signal 6) while trying 16 lanes" in reports[1].fault
+
+
+@pytest.mark.conformance
+@pytest.mark.usefixtures("_rigged")
+def test_a_trial_is_remembered(device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    told: list[str] = []
+    first = tune.lane_reports(device, "float32", on_start=told.append)
+    assert told == [f"measuring {device.info.name}, once"]
+    monkeypatch.setenv(child.TEST_ABORT, "trying")
+    assert tune.lane_reports(device, "float32", on_start=told.append) == first
+    assert len(told) == 1
+    facts = cache.recall("lanes")
+    assert len(facts) == 4
+    assert all(key.startswith(device.info.key) for key in facts)
+
+
+@pytest.mark.conformance
+def test_each_number_type_has_its_own_trials(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tune, "PROBE", f"{_HERE}:wide_numbers_job")
+    both = Device(dataclasses.replace(device.info, has_float64=True), device.cl_device)
+    for _ in range(2):  # tried, then remembered
+        assert tune.accepted_lanes(both, "float32") == (1, 4, 8, 16)
+        assert tune.accepted_lanes(both, "float64") == ()
+    assert len(cache.recall("lanes")) == 8
+
+
+@pytest.mark.conformance
+def test_a_device_without_float64_says_so(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lesser = Device(dataclasses.replace(device.info, has_float64=False), device.cl_device)
+    for question in (tune.accepted_lanes, fma_peak):
+        with pytest.raises(DeviceError, match=r"has no float64$") as caught:
+            question(lesser, "float64")
+        assert caught.value.status == 2
+
+
+@pytest.mark.conformance
+def test_the_peak_is_a_rate(device: Device) -> None:
+    """No timing is tested, only that the chains are not folded away: that would give millions of GFLOP/s."""
+    assert 1e-6 < fma_peak(device, "float32") < 1e6

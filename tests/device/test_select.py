@@ -1,9 +1,11 @@
-"""Which device is taken, and what is said when none fits."""
+"""Which device is taken, and what is said when none fits; several devices, and parts of one."""
 
 from __future__ import annotations
 
+import ctypes
 import dataclasses
 import os
+import struct
 import subprocess
 import sys
 import time
@@ -12,10 +14,26 @@ from pathlib import Path
 
 import pyopencl as cl
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from clfractal.device import cache, select
-from clfractal.device.select import Device, DeviceInfo, Properties, choose, devices
+from clfractal.device import cache, choice, select, unknown_cpu
+from clfractal.device.choice import choose_all
+from clfractal.device.select import (
+    ENVIRONMENT_VARIABLE,
+    Device,
+    DeviceInfo,
+    Properties,
+    choose,
+    devices,
+    is_pocl,
+)
+from clfractal.device.select import devices as all_devices
+from clfractal.device.subdevices import without_parts
+from clfractal.device.unknown_cpu import nearest_known, place_of_name, processor_features
 from clfractal.errors import DeviceError
+from tests.halves import halves_of, index_of
+from tests.shell import python, works
 
 _BASE = DeviceInfo(
     index="0:0",
@@ -249,3 +267,173 @@ def test_a_device_that_fails_is_status_3(device: Device) -> None:
     with expected as caught, device.failures("reading"):
         cl.enqueue_copy(device.queue, bytearray(1 << 20), buffer)
     assert caught.value.status == 3
+
+
+# --- several devices by their names, and parts of one ---
+
+
+@given(st.text(max_size=20), st.lists(st.integers(0, 999), min_size=1, max_size=5))
+def test_parts_are_read(name: str, counts: list[int]) -> None:
+    spec = f"{name}/{'+'.join(map(str, counts))}"
+    assert without_parts(spec) == (name.strip(), tuple(counts))
+
+
+@given(st.text(max_size=30).filter(lambda text: "/" not in text))
+def test_other_names_have_no_parts(name: str) -> None:
+    assert without_parts(name) == (name, ())
+
+
+def test_halves(device: Device) -> None:
+    spec = halves_of(device)
+    parts = choose_all([spec])
+    assert [part.info.index for part in parts] == [f"{spec}#1", f"{spec}#2"]
+    assert sum(part.info.compute_units for part in parts) == device.info.compute_units
+    assert [int(part.cl_device.max_compute_units) for part in parts] == [
+        part.info.compute_units for part in parts
+    ]
+    assert {part.info.key for part in parts} == {device.info.key}
+    assert choose_all([spec]) == parts  # with the contexts that they have
+
+
+def test_one_part_is_one_device(device: Device) -> None:
+    halves_of(device)
+    assert choose(f"{device.info.index}/1").info.compute_units == 1
+
+
+def test_the_variable_may_name_several(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(ENVIRONMENT_VARIABLE, halves_of(device))
+    assert len(choose_all()) == 2
+    with pytest.raises(DeviceError, match="--device: names several devices, but this work takes one"):
+        choose()
+
+
+def test_all_has_one_driver_of_the_processor(device: Device) -> None:
+    found = choose_all(["all"])
+    assert sum(each.info.kind == "cpu" for each in found) <= 1
+    assert len({each.info.index for each in found}) == len(found)
+    assert found[0].info == choose("").info
+
+
+@pytest.mark.parametrize(
+    ("specs", "message"),
+    [
+        (
+            ["{0}", "{0}"],
+            "--device: {0} is named twice; parts of a device are named together, such as {0}/1+1",
+        ),
+        (["{0}", "{kind}"], "--device: {0} and {kind} are the same device, {0}"),
+        (["{0}/1", "{0}"], "--device: {0}/1 and {0} share the device {0}; name its parts together"),
+        (["{0}", "all"], "--device: all stands alone: it names every device"),
+        (["{0}", "no such device"], "unknown device 'no such device'; available: "),
+        (["{0}/1000"], "has {units} compute units, but 1000 are wanted"),
+        (["{0}/0+1"], "a part needs at least 1 compute unit, got 0+1"),
+        (["all/1"], "--device: names several devices"),
+    ],
+)
+def test_wrong_names(specs: list[str], message: str, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    halves_of(device)
+    # `cpu` names the best one, which need not be the one under test.
+    monkeypatch.setattr(choice, "choose", lambda spec: device if spec == device.info.kind else choose(spec))
+    facts = {"kind": device.info.kind, "units": device.info.compute_units}
+    index = index_of(device)
+    with pytest.raises(DeviceError) as caught:
+        choose_all([spec.format(index, **facts) for spec in specs])
+    assert caught.value.status == 2
+    assert message.format(index, **facts) in str(caught.value)
+
+
+# --- processors that PoCL's wheel does not know get the name of one that it does ---
+
+
+TRIPLE = b"x86_64-unknown-linux-gnu"
+
+
+class Memory:
+    """A record of pointers to texts, at addresses of its own."""
+
+    def __init__(self, *texts: bytes | int) -> None:
+        self.parts: dict[int, bytes] = {}
+        pointers = []
+        for place, text in enumerate(texts):
+            if isinstance(text, int):
+                pointers.append(text)
+                continue
+            pointers.append(0x10000 + 0x100 * place)
+            self.parts[pointers[-1]] = text + b"\0" + b"rest"
+        self.parts[0x1000] = struct.pack(f"<{len(pointers)}Q", *pointers)
+
+    def read(self, address: int, size: int) -> bytes:
+        return self.parts.get(address, b"")[:size]
+
+
+def test_the_name_beside_the_triple_is_found() -> None:
+    memory = Memory(7, b"pthread", b"generic", 0, TRIPLE, b"generic", 2**63)
+    assert place_of_name(0x1000, memory.read) == 0x1000 + 5 * 8
+
+
+def test_the_name_of_an_older_processor_is_wrong_for_one_with_wide_vectors() -> None:
+    memory = Memory(b"pthread", TRIPLE, b"znver3")
+    assert place_of_name(0x1000, memory.read) is None
+    assert place_of_name(0x1000, memory.read, best=True) == 0x1000 + 2 * 8
+
+
+def test_the_record_of_a_neighbour_is_not_looked_at() -> None:
+    memory = Memory(*[b"text"] * 100, TRIPLE, b"generic")
+    assert place_of_name(0x1000, memory.read) is None
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [
+        (b"pthread", TRIPLE, b"skylake-avx512", b"generic"),
+        (b"generic", b"nvptx64-nvidia", b"generic"),
+        (b"pthread", TRIPLE),
+        (),
+    ],
+)
+def test_other_records_stay_as_they_are(texts: tuple[bytes, ...]) -> None:
+    assert place_of_name(0x1000, Memory(*texts).read) is None
+
+
+def test_a_processor_gets_the_best_name_whose_instructions_it_has() -> None:
+    old, wide = {"sse2", "fpu"}, {"avx2", "fma", "bmi1", "bmi2", "movbe", "f16c", "abm", "adx"}
+    widest = wide | {"avx512f", "avx512bw", "avx512cd", "avx512dq", "avx512vl"}
+    assert [nearest_known(each) for each in (set(), old, wide, widest)] == [
+        b"x86-64",
+        b"x86-64",
+        b"haswell",
+        b"skylake-avx512",
+    ]
+
+
+def test_features_are_read_where_linux_tells_them(tmp_path: Path) -> None:
+    told = tmp_path / "cpuinfo"
+    told.write_text("processor\t: 0\nflags\t\t: fpu avx2 fma\nprocessor\t: 1\nflags\t\t: other\n")
+    assert processor_features(told) == {"fpu", "avx2", "fma"}
+    assert processor_features(tmp_path / "none") == frozenset()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="reads Linux's file of a process's memory")
+def test_memory_of_the_process_itself_is_changed(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(unknown_cpu, "processor_features", frozenset)
+    monkeypatch.setattr(unknown_cpu, "_texts", {})
+    texts = [ctypes.create_string_buffer(text) for text in (b"pthread", TRIPLE, b"generic")]
+    record = (ctypes.c_uint64 * 512)(*(ctypes.addressof(text) for text in texts))
+    assert unknown_cpu.name_processor(ctypes.addressof(record)) == b"x86-64"
+    assert ctypes.string_at(record[2]) == b"x86-64"
+    assert unknown_cpu.name_processor(ctypes.addressof(record)) == b"x86-64"
+    assert unknown_cpu.name_processor(8) is None  # where there is no memory
+
+
+def test_every_pocl_device_compiles() -> None:
+    """In a process of its own each, with nothing but what the program does when it looks for devices."""
+    program = (
+        "import sys, pyopencl as cl; from clfractal.device.select import devices\n"
+        "device = next(each for each in devices() if each.index == sys.argv[1])\n"
+        "from clfractal.device.select import choose\n"
+        "chosen = choose(device.index)\n"
+        "cl.Program(chosen.context, '__kernel void a(__global float *x) { x[0] = sin(x[0]); }').build()\n"
+    )
+    found = [info.index for info in all_devices() if is_pocl(info)]
+    for index in found:
+        works(python(program, index))

@@ -1,7 +1,9 @@
-"""OpenEXR files, read back with the library's other interface (`OpenEXR.File`)."""
+"""OpenEXR files, read back with the library's other interface (`OpenEXR.File`); damaged ones are told in a line each."""
 
 from __future__ import annotations
 
+import random
+import struct
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
@@ -9,11 +11,15 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from clfractal.errors import FileError
 from clfractal.files import exr
+from clfractal.files.channels import CHANNELS, VIEWS, in_view, without_view
 from clfractal.files.exr import read_exr, to_half, write_exr
-from tests.files.limits import file_size_limit
+from clfractal.files.exr_header import MAGIC, Attribute, read_header, read_scene_text
+from tests.files.limits import file_size_limit, rewrite
 
 WORLD_TO_CAMERA = np.arange(16, dtype=np.float32).reshape(4, 4) / 7
 
@@ -201,3 +207,228 @@ def test_a_library_that_keeps_quiet_about_lost_bytes_is_found_out(
     with pytest.raises(FileError, match=r"a\.exr: cannot be written: the library left it incomplete"):
         write(path, planes(40, 40))
     assert path.read_bytes() == b"old"
+
+
+# --- several views ---
+
+
+def view_of(name: str, views: tuple[str, ...] = VIEWS) -> str:
+    """The view that a reader takes a channel for: "Storing Multi-View Images in OpenEXR Files", "Channel Naming"."""
+    parts = name.split(".")
+    if len(parts) == 1:
+        return views[0]
+    return parts[-2] if parts[-2] in views else ""
+
+
+@pytest.mark.parametrize("name", CHANNELS)
+def test_readers_find_every_channel_in_its_view(name: str) -> None:
+    names = [in_view(name, view) for view in VIEWS]
+    assert [view_of(found) for found in names] == ["left", "right"]
+    assert [without_view(found) for found in names] == [name, name]
+    assert without_view(name) == name
+    assert max(map(len, names)) <= 31  # the longest that readers of the first version take
+
+
+def test_names() -> None:
+    assert [in_view(name, "left") for name in ("R", "N.X", "a.b.c")] == ["R", "N.left.X", "a.b.left.c"]
+    assert [in_view(name, "right") for name in ("R", "N.X", "a.b.c")] == [
+        "right.R",
+        "N.right.X",
+        "a.b.right.c",
+    ]
+    # A view is looked for before the last part of a name, and nowhere else.
+    assert [without_view(name) for name in ("right", "right.N.X", "N.left")] == [
+        "right",
+        "right.N.X",
+        "N.left",
+    ]
+
+
+def write_views(path: Path, **header: object) -> dict[str, np.ndarray]:
+    names = [in_view(name, view) for view in VIEWS for name in ("R", "Z", "N.X")]
+    source = np.random.default_rng(4)
+    planes = {name: source.random((20, 30), dtype=np.float32) for name in names}
+    planes["right.Z"][2, 3] = np.inf
+    planes["right.R"][2, 3] = np.inf
+    write_exr(
+        path,
+        [planes],
+        display=(30, 20),
+        region=(0, 0, 30, 20),
+        channels=names,
+        half={"R", "right.R", "right.Z"},
+        header={"multiView": VIEWS, **header},
+    )
+    return planes
+
+
+def test_the_library_reads_both_views(tmp_path: Path) -> None:
+    camera = np.arange(16, dtype=np.float32).reshape(4, 4)
+    planes = write_views(tmp_path / "a.exr", **{"clfractal": "version: 1\n", "right.worldToCamera": camera})
+    with OpenEXR.File(str(tmp_path / "a.exr"), separate_channels=True) as file:
+        header = dict(file.header())
+        found = {name: np.array(channel.pixels) for name, channel in file.channels().items()}
+        assert len(file.parts) == 1
+    assert header["multiView"] == ["left", "right"]
+    assert header["clfractal"] == "version: 1\n"
+    assert np.array_equal(header["right.worldToCamera"], camera)
+    assert sorted(found) == ["N.left.X", "N.right.X", "R", "Z", "right.R", "right.Z"]
+    for name in ("N.left.X", "N.right.X", "Z"):
+        assert np.array_equal(found[name], planes[name])
+    # Infinite depth stays infinite in every view, infinite light does not.
+    assert found["right.Z"].dtype == np.float16
+    assert found["right.Z"][2, 3] == np.inf
+    assert found["right.R"][2, 3] == 65504
+
+
+def test_our_reader_knows_lists_of_texts(tmp_path: Path) -> None:
+    write_views(tmp_path / "a.exr", names=["", "Grüße"], none=[])
+    values = read_header(tmp_path / "a.exr").values()
+    assert values["multiView"] == ("left", "right")
+    assert values["names"] == ("", "Grüße")
+    assert values["none"] == ()
+    assert sorted(read_exr(tmp_path / "a.exr")[0]) == sorted(read_header(tmp_path / "a.exr").channels)
+
+
+def test_a_text_is_no_list_of_texts(tmp_path: Path) -> None:
+    write_views(tmp_path / "a.exr", view="right")
+    with OpenEXR.File(str(tmp_path / "a.exr")) as file:
+        assert file.header()["view"] == "right"
+
+
+@given(st.binary(max_size=60) | st.lists(st.binary(max_size=9)).map(b"\x02\0\0\0".join))
+def test_damaged_lists_of_texts_do_no_harm(data: bytes) -> None:
+    found = Attribute("stringvector", data, 0).value()
+    assert isinstance(found, tuple)
+    whole = b"".join(struct.pack("<i", len(text)) + text for text in (b"left", b"", b"right"))
+    assert Attribute("stringvector", whole, 0).value() == ("left", "", "right")
+    assert Attribute("stringvector", whole + struct.pack("<i", -1) + data, 0).value() == ("left", "", "right")
+
+
+# --- damaged files and their headers ---
+
+
+SCENE = "version: 1\nformula: {name: hast}\n# Grüße\n"
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> bytes:
+    """A file of ours with several chunks."""
+    path = tmp_path_factory.mktemp("exr") / "a.exr"
+    source = np.random.default_rng(1)
+    band = {name: source.random((50, 9), dtype=np.float32) for name in "RZ"}
+    header = {"clfractal": SCENE, "worldToCamera": np.eye(4)}
+    write_exr(path, [band], display=(9, 50), region=(0, 0, 9, 50), channels="RZ", half="R", header=header)
+    return path.read_bytes()
+
+
+def refusal(path: Path, content: bytes) -> str:
+    rewrite(path, content)
+    with pytest.raises(FileError) as caught:
+        read_scene_text(path)
+    assert caught.value.where.file == str(path)
+    assert "\n" not in str(caught.value)
+    return caught.value.message
+
+
+def test_scene_comes_back(tmp_path: Path, whole: bytes) -> None:
+    (tmp_path / "a.exr").write_bytes(whole)
+    assert read_scene_text(tmp_path / "a.exr") == SCENE
+    values = read_header(tmp_path / "a.exr").values()
+    assert values["dataWindow"] == (0, 0, 8, 49)
+    assert values["screenWindowCenter"] == (0, 0)
+    assert values["pixelAspectRatio"] == 1
+
+
+def test_every_truncation_is_refused(tmp_path: Path, whole: bytes) -> None:
+    for length in range(len(whole)):
+        message = refusal(tmp_path / "a.exr", whole[:length])
+        assert "cut short" in message or (length < 4 and message == "is not an OpenEXR file"), length
+
+
+def test_random_damage_never_breaks_the_reader(tmp_path: Path, whole: bytes) -> None:
+    path = tmp_path / "a.exr"
+    (tmp_path / "b.exr").write_bytes(whole)
+    end = read_header(tmp_path / "b.exr").end + 8 * 4
+    source = random.Random(2)
+    refused, lines = 0, set[int]()
+    for _ in range(2000):
+        damaged = bytearray(whole)
+        for _ in range(source.randint(1, 3)):
+            damaged[source.randrange(end)] = source.randrange(256)
+        rewrite(path, bytes(damaged))
+        try:
+            read_scene_text(path)
+        except FileError as error:
+            refused += 1
+            lines |= {str(error).count("\n")}
+    assert refused > 500
+    assert lines == {0}
+
+
+def test_foreign_pictures_have_no_scene(tmp_path: Path) -> None:
+    pixels = {"Z": np.zeros((40, 40), np.float32)}
+    tiled = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()}
+    for compression in (OpenEXR.NO_COMPRESSION, OpenEXR.PIZ_COMPRESSION, OpenEXR.RLE_COMPRESSION):
+        for kind in ({"type": OpenEXR.scanlineimage}, tiled):
+            with OpenEXR.File({**kind, "compression": compression}, pixels) as file:
+                file.write(str(tmp_path / "a.exr"))
+            assert read_scene_text(tmp_path / "a.exr") is None
+
+
+def test_a_scene_of_another_type_is_none(tmp_path: Path, whole: bytes) -> None:
+    old = b"clfractal\0string\0"
+    assert old in whole
+    (tmp_path / "a.exr").write_bytes(whole.replace(old, b"clfractal\0strinG\0"))
+    assert read_scene_text(tmp_path / "a.exr") is None
+
+
+def attribute(name: bytes, kind: bytes, data: bytes, length: int | None = None) -> bytes:
+    size = len(data) if length is None else length
+    return name + b"\0" + kind + b"\0" + struct.pack("<i", size) + data
+
+
+def test_hostile_headers(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    start = MAGIC + struct.pack("<I", 2)
+    assert refusal(path, b"v/1\x02" + bytes(100)) == "is not an OpenEXR file"
+    assert refusal(path, MAGIC + struct.pack("<I", 3)).startswith("is an OpenEXR file of version 3")
+    assert refusal(path, start + b"n" * 1000) == "is damaged: an endless name"
+    for length in (-1, 2**31 - 1):
+        assert refusal(path, start + attribute(b"a", b"string", b"", length)).startswith("is damaged")
+    many = b"".join(attribute(b"%d" % index, b"int", b"1234") for index in range(2000))
+    assert refusal(path, start + many + b"\0").startswith("is damaged")
+    assert refusal(path, start + b"\0").startswith("is damaged: its header lacks")
+
+
+def picture(box: tuple[int, int, int, int], compression: int, channels: bytes) -> bytes:
+    return (
+        MAGIC
+        + struct.pack("<I", 2)
+        + attribute(b"channels", b"chlist", channels)
+        + attribute(b"compression", b"compression", bytes([compression]))
+        + attribute(b"dataWindow", b"box2i", struct.pack("<4i", *box))
+        + b"\0"
+        + bytes(1000)
+    )
+
+
+def test_impossible_pictures(tmp_path: Path) -> None:
+    path = tmp_path / "a.exr"
+    one = b"Z\0" + struct.pack("<iIii", 2, 0, 1, 1) + b"\0"
+    huge = 2**31 - 1
+    for box, compression, channels in (
+        ((0, 0, huge, huge), 3, one),
+        ((0, 0, huge, huge), 4, one),
+        ((-huge, -huge, huge, huge), 0, one),
+        ((5, 5, 4, 4), 3, one),
+        ((0, 0, 9, 9), 77, one),
+        ((0, 0, 9, 9), 3, b""),
+        ((0, 0, 9, 9), 3, b"\0"),
+        ((0, 0, 9, 9), 3, b"Z\0"),
+        ((0, 0, 9, 9), 3, b"Z\0" + struct.pack("<iIii", 9, 0, 1, 1) + b"\0"),
+        ((0, 0, 9, 9), 3, b"Z\0" + struct.pack("<iIii", 2, 0, 0, 1) + b"\0"),
+        ((0, 0, 9, 9), 3, one),  # a table of zeros: never finished
+    ):
+        message = refusal(path, picture(box, compression, channels))
+        assert message.startswith(("is damaged", "is cut short")), (box, compression)

@@ -1,4 +1,4 @@
-"""The compilers themselves, where they are: figures of small kernels, and what the command says and gives back."""
+"""The check for GPUs: its compilers where they are, figures that are read and kept, limits, pairs of features."""
 
 from __future__ import annotations
 
@@ -6,15 +6,25 @@ import os
 import shutil
 from dataclasses import replace
 from functools import cache
+from itertools import combinations
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, SourceMap
+from clfractal.device.structs import Precision
+from clfractal.formulas import catalog
+from clfractal.formulas.opencl import write_formula
+from clfractal.scene.checks import MAX_PLANES
+from clfractal.scene.lighting import MAX_LIGHTS
+from clfractal.shading.light_records import LIGHT
 from tests.gpu import __main__ as command
-from tests.gpu import compilers, listing, record, table
+from tests.gpu import compilers, limits, listing, record, table
 from tests.gpu.compilers import Compilers, MissingCompilerError, RejectedError
-from tests.gpu.figures import GPUS, Figures
+from tests.gpu.figures import GPUS, Figures, of_amd, of_ptxas
+from tests.gpu.pairs import Pair, covering
 from tests.gpu.record import Record
 
 EXPECTED = "CLFRACTAL_EXPECT_GPU_COMPILERS"
@@ -159,3 +169,324 @@ def test_without_compilers_it_says_what_to_install(
     assert capsys.readouterr().err.startswith(
         "gpu-check: compilers for GPUs are missing: apt-get install clang-16 libclc-16"
     )
+
+
+# --- figures ---
+
+
+PTXAS = """ptxas info    : 0 bytes gmem, 208 bytes cmem[4]
+ptxas info    : Compiling entry function 'first' for 'sm_75'
+ptxas info    : Function properties for first
+    240 bytes stack frame, 24 bytes spill stores, 32 bytes spill loads
+ptxas info    : Used 168 registers, used 1 barriers, 4096 bytes smem, 492 bytes cmem[0]
+ptxas info    : Compile time = 12.345 ms
+ptxas info    : Compiling entry function 'second' for 'sm_75'
+ptxas info    : Function properties for second
+    0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads
+ptxas info    : Used 18 registers, 400 bytes cmem[0]
+"""
+
+AMD = """
+	.amdhsa_kernel first
+	.amdhsa_kernel second
+amdhsa.kernels:
+  - .args:
+      - .address_space:  global
+        .name:           out
+        .offset:         0
+    .group_segment_fixed_size: 512
+    .name:           first
+    .private_segment_fixed_size: 136
+    .sgpr_spill_count: 25
+    .symbol:         first.kd
+    .vgpr_count:     195
+    .vgpr_spill_count: 3
+    .wavefront_size: 32
+  - .args:           []
+    .group_segment_fixed_size: 0
+    .name:           second
+    .private_segment_fixed_size: 0
+    .vgpr_count:     11
+    .vgpr_spill_count: 0
+amdhsa.target:   amdgcn-amd-amdhsa--gfx1030
+amdhsa.version:
+  - 1
+  - 1
+"""
+
+
+def test_what_ptxas_says() -> None:
+    assert of_ptxas(PTXAS) == {"first": Figures(168, 240, 24, 4096), "second": Figures(18)}
+
+
+def test_what_stands_in_assembly_for_amd() -> None:
+    """A register that is spilled takes four bytes; names of arguments are no kernels."""
+    assert of_amd(AMD) == {"first": Figures(195, 136, 12, 512), "second": Figures(11)}
+
+
+def test_a_kernel_without_metadata_is_noticed() -> None:
+    with pytest.raises(ValueError, match="third"):
+        of_amd(AMD.replace("\t.amdhsa_kernel second", "\t.amdhsa_kernel second\n\t.amdhsa_kernel third"))
+
+
+@pytest.mark.parametrize(
+    ("name", "registers", "expected"),
+    [
+        # CUDA's occupancy calculator, of registers alone.
+        *(("sm_75", 64, 32), ("sm_75", 65, 28), ("sm_75", 96, 20), ("sm_75", 168, 12), ("sm_75", 255, 8)),
+        *(("sm_90", 1, 64), ("sm_90", 32, 64), ("sm_90", 33, 48), ("sm_90", 96, 20), ("sm_90", 255, 8)),
+        # What LLVM writes into its assembly, of two SIMDs.
+        *(("gfx1030", 64, 32), ("gfx1030", 85, 20), ("gfx1030", 175, 10), ("gfx1030", 256, 8)),
+        *(("gfx1100", 96, 32), ("gfx1100", 171, 16), ("gfx1100", 256, 10)),
+    ],
+)
+def test_how_many_fit_beside_each_other(name: str, registers: int, expected: int) -> None:
+    (gpu,) = [gpu for gpu in GPUS if gpu.name == name]
+    assert gpu.occupancy(Figures(registers)) == expected
+
+
+def test_local_memory_leaves_room_for_fewer_groups() -> None:
+    by_name = {gpu.name: gpu for gpu in GPUS}
+    assert by_name["gfx1030"].occupancy(Figures(48, local=16 * 1024)) == 8
+    assert by_name["sm_90"].occupancy(Figures(48, local=16 * 1024)) == 28
+    assert by_name["sm_75"].occupancy(Figures(255, local=1)) == 8
+
+
+def test_what_is_worse() -> None:
+    old = Figures(96, 0, 0)
+    assert not old.worse_than(old)
+    assert not Figures(95).worse_than(old)
+    assert Figures(97, 8).worse_than(old) == ["registers 97, were 96", "stack 8, were 0"]
+
+
+# --- limits ---
+
+
+ENTRY = ".entry kernel_a(\n{}\n)\n{{\n}}\n"
+CONSTANT = ".param .u64 .ptr .const .align 8 kernel_a_param_{}"
+GLOBAL = ".param .u64 .ptr .global .align 4 kernel_a_param_{}"
+
+
+def entry(*arguments: str) -> str:
+    return ENTRY.format(",\n".join(f"\t{each}" for each in arguments))
+
+
+def test_arguments_are_counted() -> None:
+    (found,) = limits.entries(
+        entry(*(CONSTANT.format(i) for i in range(3)), GLOBAL.format(3), ".param .u32 kernel_a_param_4")
+    )
+    assert found == limits.Entry("kernel_a", 3, 36, 0)
+
+
+def test_what_is_guaranteed_passes() -> None:
+    ptx = ".const .align 4 .b8 table[65536];\n.shared .align 4 .b8 rays[32768];\n" + entry(
+        *(CONSTANT.format(i) for i in range(8)), *(GLOBAL.format(i) for i in range(8, 128))
+    )
+    assert not list(limits.broken(ptx))
+
+
+@pytest.mark.parametrize(
+    ("ptx", "told"),
+    [
+        (entry(*(CONSTANT.format(i) for i in range(9))), "9 constant arguments, 8 are guaranteed"),
+        (entry(*(GLOBAL.format(i) for i in range(129))), "1032 bytes of arguments, 1024 are guaranteed"),
+        (entry(".param .align 8 .b8 kernel_a_param_0[48]"), "vectors or structs"),
+        (".const .align 16 .b8 one[65000];\n.const .align 4 .u32 two[200];\n", "65800 bytes of .const"),
+        (".shared .align 4 .f64 rays[4097];\n", "32776 bytes of .shared"),
+        ("\tcvta.const.u64 \t%rd1, %rd2;\n", "older drivers"),
+        (
+            ".func  (.param .b32 func_retval0) f(\n\t.param .b32 f_param_0\n)\n{\n\tcall.uni (retval0), \n\tg, \n\t(\n"
+            "\tparam0\n\t);\n}\n.func g(\n)\n{\n\tcall.uni \n\tf, \n\t(\n\t);\n}\n",
+            "recursion",
+        ),
+    ],
+)
+def test_what_is_not_guaranteed_is_told(ptx: str, told: str) -> None:
+    (line,) = limits.broken(ptx)
+    assert told in line
+
+
+@pytest.mark.parametrize(
+    "code",
+    [
+        "printf(1);",
+        "goto end;",
+        "float3 a;",
+        "uchar3 a = vload3(0, p);",
+        "half a;",
+        "vload_half(0, p);",
+        "work_group_reduce_add(a);",
+        "sub_group_broadcast(a, 0);",
+        "__generic int *p;",
+        "barrier(CLK_LOCAL_MEM_FENCE);",
+        "atom_add(p, 1l);",
+        "__builtin_fma(a, b, c);",
+        "write_imagef(shown, at, color);",
+        "__write_only image2d_t shown",
+        'asm("bar");',
+        "float f(__constant const float row[3], int i) { return row[i]; }",
+    ],
+)
+def test_words_that_devices_lack(code: str) -> None:
+    assert list(limits.words(code, code))
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_the_longest_lists_fit_constant_memory(precision: Precision) -> None:
+    """Lights, and the orbits of the object and of all planes; constants of a formula of the library are few."""
+    assert MAX_LIGHTS * LIGHT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    assert (1 + MAX_PLANES) * ORBIT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    most = max(len(write_formula(catalog.load_chain(name)).constants) for name in catalog.names())
+    assert 0 < 100 * most * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+
+
+def test_words_that_are_no_such_words() -> None:
+    code = (
+        "float4 a = vload4(0, p); const float half_side = 0.5f; atomic_inc(p); float8 imagery; int printf_ed;"
+        "float f(__constant const float *row, float a[3]) { __local float b[4]; return b[0]; }"
+    )
+    assert not list(limits.words(code, code))
+
+
+def test_a_program_for_images_may_have_them() -> None:
+    code = "write_imagef(shown, at, color);"
+    assert not list(limits.words(f"__kernel void show(__write_only image2d_t shown) {{ {code} }}", code))
+    assert list(limits.words(f"__kernel void show(__global float4 *shown) {{ {code} }}", code))
+
+
+# --- pairs of features ---
+
+
+FACTORS = {
+    "a": ("1", "2", "3"),
+    "b": ("1", "2"),
+    "c": ("1", "2", "3", "4"),
+    **{f"d{i}": ("no", "yes") for i in range(8)},
+}
+
+
+def met(choices: list[dict[str, str]]) -> set[Pair]:
+    return {frozenset(pair) for chosen in choices for pair in combinations(chosen.items(), 2)}
+
+
+def every_pair() -> set[Pair]:
+    return {
+        frozenset({(one, first), (other, second)})
+        for one, other in combinations(FACTORS, 2)
+        for first in FACTORS[one]
+        for second in FACTORS[other]
+    }
+
+
+def test_all_pairs_meet_in_few_choices() -> None:
+    choices = covering(FACTORS)
+    assert met(choices) == every_pair()
+    # The least is 3 * 4; all combinations are 6144.
+    assert 12 <= len(choices) <= 18
+    assert covering(FACTORS) == choices
+
+
+def test_what_must_not_meet_does_not() -> None:
+    apart = {frozenset({("a", "1"), ("c", "2")}), frozenset({("b", "2"), ("d0", "yes")})}
+    assert met(covering(FACTORS, apart)) == every_pair() - apart
+
+
+def test_names_tell_programs_apart() -> None:
+    programs = listing.unlike(listing.paired())
+    assert len({each.name for each in programs}) == len(programs)
+    assert len({(each.text.text, each.precision) for each in programs}) == len(programs)
+    assert {each.precision for each in programs} == {"float32", "float64"}
+
+
+# --- the record ---
+
+
+KNOWN = Record(
+    {"clang": "16.0.6"},
+    {
+        "march hast float32 | march": {"sm_75": Figures(96), "gfx1030": Figures(85)},
+        "surface still float32 | surface": {"sm_75": Figures(192, 952), "gfx1030": Figures(183, 960)},
+    },
+    {"march hast float32": "0123456789abcdef"},
+)
+
+
+def test_a_record_comes_back(tmp_path: Path) -> None:
+    path = tmp_path / "record.json"
+    record.save(KNOWN, path)
+    assert record.load(path) == KNOWN
+    assert sum("|" in line for line in path.read_text(encoding="utf-8").splitlines()) == 2
+    assert record.load(tmp_path / "none.json").figures == {}
+
+
+def test_what_is_worse_is_told_and_nothing_else() -> None:
+    name = "march hast float32 | march"
+    assert not list(record.worse(KNOWN.figures, KNOWN))
+    assert list(record.worse({name: {"sm_75": Figures(97), "gfx1030": Figures(80)}}, KNOWN)) == [
+        f"{name}: sm_75: registers 97, were 96"
+    ]
+    assert list(record.worse({"march hast float64 | march": {"sm_75": Figures(1)}}, KNOWN)) == [
+        "march hast float64 | march: not on record"
+    ]
+    assert list(record.worse({name: {"sm_90": Figures(1)}}, KNOWN)) == [f"{name}: sm_90: not on record"]
+
+
+def test_what_is_better_is_counted() -> None:
+    name = "march hast float32 | march"
+    assert record.better(KNOWN.figures, KNOWN) == 0
+    assert record.better({name: {"sm_75": Figures(95), "gfx1030": Figures(85)}}, KNOWN) == 1
+    assert record.better({name: {"sm_75": Figures(95), "gfx1030": Figures(86)}}, KNOWN) == 0
+
+
+def test_a_row_of_the_table_is_the_most_of_its_programs() -> None:
+    figures = {
+        f"surface {name} float32 | surface": {gpu.name: each for gpu in GPUS}
+        for name, each in (("one", Figures(64, 8)), ("two", Figures(96, 0, 4)))
+    }
+    rows = table.markdown(figures).splitlines()[2:-2]
+    cells = "96, 20 warps, 8 B stack, 4 B spilled | 96, 20 warps, 8 B stack, 4 B spilled"
+    waves = "96, 20 waves, 8 B stack, 4 B spilled | 96, 32 waves, 8 B stack, 4 B spilled"
+    assert rows == [f"| `surface` | float32 | 2 | {cells} | {waves} |"]
+
+
+def test_marches_are_told_apart_by_their_rule() -> None:
+    figures = {
+        f"march {name} float32 | march": {gpu.name: Figures(50) for gpu in GPUS}
+        for name in ("mandelbulb", "hast")
+    }
+    assert [line.split(" | ")[0] for line in table.markdown(figures).splitlines()[2:-2]] == [
+        "| `march`, Jacobian",
+        "| `march`, scalar rule",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("name", "figures", "above"),
+    [
+        ("march hast float32 | march", Figures(96), None),
+        ("march hast float32 | march", Figures(97), "`march`, Jacobian (float32)"),
+        ("march hast float64 | march", Figures(168, 88, 8), None),
+        ("march hast float64 | march", Figures(169), "`march`, Jacobian (float64)"),
+        ("surface hast float32 | shade", Figures(255), None),
+        ("surface hast float32 | shade", Figures(20, 8), "`shade` (float32)"),
+        ("surface hast float32 | shade", Figures(20, 0, 4), "`shade` (float32)"),
+        ("surface hast float64 | shade", Figures(255, 80, 40), None),
+    ],
+)
+def test_what_is_above_the_targets(name: str, figures: Figures, above: str | None) -> None:
+    last = table.markdown({name: {gpu.name: figures for gpu in GPUS}}).splitlines()[-1]
+    assert last == (f"Above the targets: {above}." if above else "All targets are met.")
+
+
+def test_a_page_keeps_all_but_the_table() -> None:
+    page = f"before\n{table.BEGIN}old\n{table.END}after\n"
+    assert table.into_page(page, "new\n") == f"before\n{table.BEGIN}new\n{table.END}after\n"
+    with pytest.raises(ValueError, match="gpu-check"):
+        table.into_page("no marks\n", "new\n")
+
+
+def test_the_documentation_shows_the_record() -> None:
+    page = table.PAGE.read_text(encoding="utf-8")
+    known = record.load()
+    assert known.figures
+    assert table.into_page(page, table.markdown(known.figures)) == page, "make gpu-check ARGUMENTS=--record"

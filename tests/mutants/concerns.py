@@ -12,10 +12,10 @@ from pathlib import Path
 # `tests/`, `test_` and `.py`. To them come the tests that bear the file's name, and for Python those that import it.
 CONCERNS = """
 kernels/formulas/numbers/*: numbers/ formulas/distance render/surface_analytic
-kernels/*/show*: engine/show engine/smoothing viewer/display
+kernels/*/show*: engine/show engine/canvas viewer/display
 kernels/images/canvas.cl: engine/canvas viewer/session
 kernels/integrators/cut_plane.cl: render/cut_plane
-kernels/*/escape*.h: render/cut_plane formulas/counts
+kernels/*/escape*.h: render/cut_plane formulas/distance
 kernels/*planes*: render/planes_in_picture render/planes_in_fog
 kernels/shading/environment.h: render/environment_kernel render/surface_rays
 kernels/shading/sun.h: render/sun
@@ -42,7 +42,7 @@ kernels/geometry/object_grids.h: render/object_grids render/turned_grids
 kernels/geometry/clouds.h: render/clouds
 kernels/shading/medium_event.h: render/clouds render/volume_paths
 kernels/integrators/volume/volume_bounds.h: render/volume_paths
-clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/blocks
+clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/lattice
 kernels/*/emitter*.h: render/emitter_places render/emitters
 kernels/geometry/rectangles.h: render/emitter_places render/surface_light
 kernels/shading/light_sampling.h: render/emitters render/surface_light render/paths
@@ -65,10 +65,10 @@ kernels/formulas/node_proof.h: voxels/
 kernels/voxels/bricks.h: voxels/
 clfractal/geometry/solids.py: voxels/joined_voxels render/joined
 kernels/*/trap*: render/coloring render/joined
-kernels/*/orbit*: formulas/counts formulas/distance render/points render/surface_analytic
-kernels/*/p[ar]*: render/reconstruction render/tiles_bits device/tune
+kernels/*/orbit*: formulas/distance render/points render/surface_analytic
+kernels/*/p[ar]*: render/reconstruction render/tiles_bits device/launch
 kernels/integrators/pixel.h: render/reconstruction render/tiles_bits render/surface_light
-kernels/formulas/points.cl: render/points formulas/counts
+kernels/formulas/points.cl: render/points formulas/distance
 kernels/voxels/grid.h: render/volume_rays render/volume_surface voxels/grid_normals
 kernels/device/gather.h: render/volume_rays render/volume_surface
 kernels/*/volume*: render/volume_rays render/volume_surface render/planes_in_fog render/turned_grids
@@ -80,7 +80,7 @@ clfractal/api.py: api stereo_python engine/engine
 clfractal/device/c[ah]*: device/isolate device/cache engine/cancel
 clfractal/device/*: device/ engine/cancel
 clfractal/files/*: files/
-clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl_text formulas/opencl formulas/catalog
+clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl formulas/catalog
 clfractal/camera/*: render/view render/stereo_views render/surface_analytic
 clfractal/images/*: render/framebuffer render/framebuffer_store render/compose render/anaglyph render/compose_files
 clfractal/integrators/*: render/job_data render/few_programs render/points render/surface_light render/volume_surface
