@@ -133,7 +133,7 @@ def test_pictures_do_not_depend_on_groups(name: str, monkeypatch: pytest.MonkeyP
 # --- lane counts, and the measured peak ---
 
 
-_HERE = "tests.device.test_tune"
+_HERE = "tests.device.test_launch"
 
 
 def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
