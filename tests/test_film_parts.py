@@ -11,10 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
-import clfractal
 from clfractal.cli.film_parts import frames_of, ranges, shown_ranges
 from clfractal.cli.film_sheet import MOST_FRAMES, spread
-from clfractal.files.whole import is_whole
 from tests.shell import InProcess, works
 
 SCENE = """version: 1
@@ -54,20 +52,6 @@ def test_a_sheet_shows_the_whole_film_evenly(count: int, step: int) -> None:
     if len(found) > 1:
         gaps = np.diff(found) / step
         assert gaps.max() - gaps.min() <= 1
-
-
-@pytest.mark.parametrize("name", ["a.exr", "a.png", "a.jpg", "a.webp"])
-def test_a_file_that_is_cut_short_anywhere_is_not_whole(name: str, tmp_path: Path) -> None:
-    film = clfractal.render(clfractal.at_frame(SCENE, 0))
-    path = tmp_path / name
-    film.save(path)
-    assert is_whole(path)
-    data = path.read_bytes()
-    for length in {*range(0, len(data), max(len(data) // 40, 1)), len(data) - 1, len(data) - 2}:
-        path.write_bytes(data[:length])
-        assert not is_whole(path), length
-    path.unlink()
-    assert not is_whole(path)
 
 
 def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:

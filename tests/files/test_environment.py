@@ -197,17 +197,6 @@ def test_what_is_no_picture(tmp_path: Path) -> None:
     assert refusal(tmp_path) == "is a folder, not a file"
 
 
-@pytest.mark.parametrize("tiled", [False, True])
-def test_cut_short(tmp_path: Path, tiled: bool) -> None:
-    header = {"type": OpenEXR.tiledimage, "tiles": OpenEXR.TileDescription()} if tiled else {}
-    noise = np.random.default_rng(2).random((64, 128, 3)).astype(np.float32)
-    path = write(tmp_path / "a.exr", planes(noise), **header)
-    content = path.read_bytes()
-    for length in (8, 50, 200, len(content) // 3, len(content) - 1):
-        path.write_bytes(content[:length])
-        assert refusal(path).startswith(("is cut short", "is damaged"))
-
-
 def test_pixels_that_cannot_be_decoded(tmp_path: Path, capfd: pytest.CaptureFixture[str]) -> None:
     rough = np.random.default_rng(2).integers(0, 9, (64, 128, 3)).astype(np.float32)
     path = write(tmp_path / "a.exr", planes(rough))

@@ -16,7 +16,6 @@ from clfractal.errors import FileError
 from clfractal.files import mesh as module
 from clfractal.files.mesh import Mesh, write_mesh
 from clfractal.files.srgb import encode
-from tests.files.limits import file_size_limit
 
 SCENE = "version: 1\nformula: {name: hast}  # ä\n"
 
@@ -163,13 +162,3 @@ def test_what_cannot_be_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch)
     with pytest.raises(FileError, match="too large for GLB"):
         write_mesh(tmp_path / "m.glb", ball())
     assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize("suffix", [".ply", ".stl", ".obj", ".glb"])
-def test_a_full_disk_leaves_the_earlier_file(suffix: str, tmp_path: Path) -> None:
-    path = tmp_path / f"m{suffix}"
-    path.write_text("earlier")
-    with file_size_limit(3000), pytest.raises(FileError, match="cannot be written"):
-        write_mesh(path, ball())
-    assert [each.name for each in tmp_path.iterdir()] == [path.name]
-    assert path.read_text() == "earlier"

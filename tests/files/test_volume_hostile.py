@@ -144,19 +144,6 @@ def test_a_way_out_of_the_folder_by_a_link(tmp_path: Path) -> None:
     assert "inside its folder" in message(inside / "v.nhdr")
 
 
-def test_cut_short_anywhere(tmp_path: Path) -> None:
-    path = tmp_path / "v.nrrd"
-    for compress in (False, True):
-        volume = Volume(np.random.default_rng(2).normal(size=(3, 4, 5)), texts={"clfractal": "a\nb"})
-        write_volume(path, volume, compress=compress)
-        content = path.read_bytes()
-        for end in {*range(0, len(content), 7), len(content) - 1}:
-            rewrite(path, content[:end])
-            assert message(path)
-        rewrite(path, content)
-        assert read_volume(path).values.shape == (3, 4, 5)
-
-
 def test_a_flipped_bit_of_compressed_data_is_seen(tmp_path: Path) -> None:
     path = tmp_path / "v.nrrd"
     write_volume(path, Volume(np.arange(60.0).reshape(3, 4, 5)), compress=True)
