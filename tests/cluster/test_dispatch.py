@@ -6,9 +6,10 @@ import asyncio
 import sys
 import threading
 from collections import deque
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from concurrent.futures import Future
 from dataclasses import replace
+from functools import wraps
 from types import SimpleNamespace
 from typing import Any
 
@@ -29,6 +30,16 @@ from clfractal.engine.run import Counters, WorkItem
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
 from clfractal.images.tiles import TILE
 from tests.shell import SCENE
+
+
+def in_a_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., None]:
+    """A test that is run in an event loop of its own."""
+
+    @wraps(test)
+    def run(*arguments: Any, **named: Any) -> None:
+        asyncio.run(test(*arguments, **named))
+
+    return run
 
 
 @pytest.fixture(scope="module")
@@ -102,35 +113,32 @@ async def until(condition: Callable[[], bool]) -> None:
     raise AssertionError("it did not come")
 
 
-def test_permits_come_back_when_work_is_dropped_as_its_answer_comes(job: Job) -> None:
+@in_a_loop
+async def test_permits_come_back_when_work_is_dropped_as_its_answer_comes(job: Job) -> None:
     """As many times as there are permits: the next work is still read."""
+    current: list[Work] = []
 
-    async def main() -> None:
-        current: list[Work] = []
+    def answer(item: WorkItem) -> tasks.Answer:
+        if current:
+            # (It runs when the answer is there, and whoever waits for it has not gone on.)
+            asyncio.get_running_loop().call_soon(own.drop, current.pop())
+        return an_answer(job, item)
 
-        def answer(item: WorkItem) -> tasks.Answer:
-            if current:
-                # (It runs when the answer is there, and whoever waits for it has not gone on.)
-                asyncio.get_running_loop().call_soon(own.drop, current.pop())
-            return an_answer(job, item)
-
-        client = Played(answer)
-        own = dispatcher(lambda: asyncio.sleep(0, linked(client, [])))
-        own._use(linked(client, [member(0, job.device)]))
-        for number in range(2 * dispatch._READ_AT_ONCE):
-            each = work(job, number)
-            current.append(each)
-            own.give(each)
-            await until(lambda: not current)
-            await asyncio.sleep(0.02)
-            while not each.answers.empty():
-                each.answers.get()
-                own.stored()
-        last = work(job, 99)
-        own.give(last)
-        await until(lambda: not last.answers.empty())
-
-    asyncio.run(main())
+    client = Played(answer)
+    own = dispatcher(lambda: asyncio.sleep(0, linked(client, [])))
+    own._use(linked(client, [member(0, job.device)]))
+    for number in range(2 * dispatch._READ_AT_ONCE):
+        each = work(job, number)
+        current.append(each)
+        own.give(each)
+        await until(lambda: not current)
+        await asyncio.sleep(0.02)
+        while not each.answers.empty():
+            each.answers.get()
+            own.stored()
+    last = work(job, 99)
+    own.give(last)
+    await until(lambda: not last.answers.empty())
 
 
 def test_each_answer_tells_its_render_device(job: Job) -> None:
@@ -241,39 +249,38 @@ def test_all_frames_of_a_film_have_the_lanes_of_the_first(job: Job) -> None:
     assert [engine.prepare(job.scene).lanes for _ in decided] == [16, 16, 4, 16, 4]
 
 
-def test_a_picture_in_float64_waits_for_its_workers_only(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+@in_a_loop
+async def test_a_picture_in_float64_waits_for_its_workers_only(
+    job: Job, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """When the last one is gone, that is told, and ends the work after a while; others' work goes on."""
     monkeypatch.setattr(dispatch, "RETURN_SECONDS", 0.6)
     told: list[str] = []
     view = job.views[0]
     double = replace(job, views=(replace(view, plan=replace(view.plan, precision="float64")),))
     small = replace(job.device, has_float64=False, driver="small")
-
-    async def main() -> None:
-        client = Played(lambda item: an_answer(job, item))
-        link = linked(client, [member(0, replace(job.device, has_float64=True)), member(1, small)])
-        own = dispatcher(lambda: asyncio.sleep(0, link), told)
-        own._use(link)
-        watching = asyncio.create_task(asyncio.sleep(60))
-        guard = asyncio.create_task(own._guarded(link, watching))
-        link._gone("tcp://host:0")
-        far, near = work(double, 1), work(job, 2)
-        own.give(far)
-        own.give(near)
-        await until(lambda: not near.answers.empty())
-        assert far.answers.empty()
-        error = await asyncio.wait_for(guard, 5)
-        watching.cancel()
-        assert isinstance(error, DeviceError)
-        assert error.status == STATUS_DEVICE_FAILED
-        assert error.message == "tcp://farm:1: there has been no worker with float64 for 1 s"
-        assert told == ["tcp://farm:1: no worker with float64 is left; waiting 1 s for one"]
-        # With one it goes on.
-        link.members["tcp://host:2"] = member(2, replace(job.device, has_float64=True))
-        link._changed()
-        await until(lambda: not far.answers.empty())
-
-    asyncio.run(main())
+    client = Played(lambda item: an_answer(job, item))
+    link = linked(client, [member(0, replace(job.device, has_float64=True)), member(1, small)])
+    own = dispatcher(lambda: asyncio.sleep(0, link), told)
+    own._use(link)
+    watching = asyncio.create_task(asyncio.sleep(60))
+    guard = asyncio.create_task(own._guarded(link, watching))
+    link._gone("tcp://host:0")
+    far, near = work(double, 1), work(job, 2)
+    own.give(far)
+    own.give(near)
+    await until(lambda: not near.answers.empty())
+    assert far.answers.empty()
+    error = await asyncio.wait_for(guard, 5)
+    watching.cancel()
+    assert isinstance(error, DeviceError)
+    assert error.status == STATUS_DEVICE_FAILED
+    assert error.message == "tcp://farm:1: there has been no worker with float64 for 1 s"
+    assert told == ["tcp://farm:1: no worker with float64 is left; waiting 1 s for one"]
+    # With one it goes on.
+    link.members["tcp://host:2"] = member(2, replace(job.device, has_float64=True))
+    link._changed()
+    await until(lambda: not far.answers.empty())
 
 
 def test_the_usual_device_has_float64_where_that_is_needed(job: Job) -> None:
@@ -296,113 +303,99 @@ class Registered:
         self.removed.append(address)
 
 
-def test_only_our_own_silent_workers_are_taken_off(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+@in_a_loop
+async def test_only_our_own_silent_workers_are_taken_off(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
     """One that never took part, of another program's, stays, however silent it is."""
     from clfractal.cluster import link as module
 
     monkeypatch.setattr(module, "SILENT_SECONDS", -1.0)
     told: list[str] = []
-
-    async def main() -> None:
-        scheduler, closed = Registered(), list[str]()
-        client = SimpleNamespace(scheduler=scheduler, rpc=SimpleNamespace(remove=closed.append))
-        own = linked(client, [member(0, job.device)], told)
-        own.refused.add("tcp://host:1")
-        about = {f"tcp://host:{number}": {"last_seen": 1.0, "name": f"w{number}"} for number in range(2)}
-        for _ in range(3):
-            await own._look(about)
-        assert scheduler.removed == closed == ["tcp://host:0"]
-        assert own.serving == []
-
-    asyncio.run(main())
+    scheduler, closed = Registered(), list[str]()
+    client = SimpleNamespace(scheduler=scheduler, rpc=SimpleNamespace(remove=closed.append))
+    own = linked(client, [member(0, job.device)], told)
+    own.refused.add("tcp://host:1")
+    about = {f"tcp://host:{number}": {"last_seen": 1.0, "name": f"w{number}"} for number in range(2)}
+    for _ in range(3):
+        await own._look(about)
+    assert scheduler.removed == closed == ["tcp://host:0"]
+    assert own.serving == []
     assert told == ["worker w0 (tcp://host:0) does not answer; its work goes to others"]
 
 
-def test_a_worker_that_returns_is_asked_again(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
+@in_a_loop
+async def test_a_worker_that_returns_is_asked_again(job: Job, monkeypatch: pytest.MonkeyPatch) -> None:
     """Also the only one that was left out."""
+    asked: list[str] = []
 
-    async def main() -> None:
-        asked: list[str] = []
+    async def enlist(address: str, name: object) -> None:
+        asked.append(address)
+        own._enlisting.pop(address)
 
-        async def enlist(address: str, name: object) -> None:
-            asked.append(address)
-            own._enlisting.pop(address)
-
-        own = linked(Played(lambda _: None), [member(0, job.device)])
-        monkeypatch.setattr(own, "_enlist", enlist)
-        own.leave_out("tcp://host:0", "its device failed")
-        there = {"tcp://host:0": {"last_seen": 1.0, "name": "w0"}}
-        await own._look(there)
-        await asyncio.sleep(0)
-        assert asked == []
-        await own._look({})
-        await own._look(there)
-        await asyncio.sleep(0)
-        assert asked == ["tcp://host:0"]
-
-    asyncio.run(main())
+    own = linked(Played(lambda _: None), [member(0, job.device)])
+    monkeypatch.setattr(own, "_enlist", enlist)
+    own.leave_out("tcp://host:0", "its device failed")
+    there = {"tcp://host:0": {"last_seen": 1.0, "name": "w0"}}
+    await own._look(there)
+    await asyncio.sleep(0)
+    assert asked == []
+    await own._look({})
+    await own._look(there)
+    await asyncio.sleep(0)
+    assert asked == ["tcp://host:0"]
 
 
 @pytest.mark.parametrize("failure", [KernelBuildError("a bug of this driver's"), DeviceError("it burns")])
-def test_a_worker_that_fails_is_left_out_alone(job: Job, failure: clfractal.ClfractalError) -> None:
+@in_a_loop
+async def test_a_worker_that_fails_is_left_out_alone(job: Job, failure: clfractal.ClfractalError) -> None:
     """Its bundle is done by another one, in spite of a program that only this driver cannot compile."""
-
-    async def main() -> None:
-        told: list[str] = []
-        failed = tasks.Failure.of(failure, "tcp://host:0")
-        answers = iter([failed])
-        client = Played(lambda item: next(answers, None) or an_answer(job, item, "tcp://host:1"))
-        link = linked(client, [member(0, job.device), member(1, job.device)], told)
-        own = dispatcher(lambda: asyncio.sleep(0, link))
-        own._use(link)
-        one = work(job)
-        own.give(one)
-        await until(lambda: one.answers.qsize() == 2)
-        done = [one.answers.get() for _ in range(2)]
-        assert sorted(tile for each in done for tile in each.tiles) == [0, 1]
-        assert link.serving == ["tcp://host:1"]
-        assert told == [f"worker w0 (tcp://host:0) is left out: {failure.message}"]
-        assert ("tiles", ["tcp://host:1"]) in client.asked
-
-    asyncio.run(main())
+    told: list[str] = []
+    failed = tasks.Failure.of(failure, "tcp://host:0")
+    answers = iter([failed])
+    client = Played(lambda item: next(answers, None) or an_answer(job, item, "tcp://host:1"))
+    link = linked(client, [member(0, job.device), member(1, job.device)], told)
+    own = dispatcher(lambda: asyncio.sleep(0, link))
+    own._use(link)
+    one = work(job)
+    own.give(one)
+    await until(lambda: one.answers.qsize() == 2)
+    done = [one.answers.get() for _ in range(2)]
+    assert sorted(tile for each in done for tile in each.tiles) == [0, 1]
+    assert link.serving == ["tcp://host:1"]
+    assert told == [f"worker w0 (tcp://host:0) is left out: {failure.message}"]
+    assert ("tiles", ["tcp://host:1"]) in client.asked
 
 
-def test_mistakes_of_the_formula_leave_nobody_out(job: Job) -> None:
-    async def main() -> None:
-        error = KernelBuildError("no such function", status=STATUS_BAD_INPUT)
-        client = Played(lambda item: tasks.Failure.of(error, "tcp://host:0"))
-        link = linked(client, [member(0, job.device), member(1, job.device)])
-        own = dispatcher(lambda: asyncio.sleep(0, link))
-        own._use(link)
-        one = work(job)
-        own.give(one)
-        await until(lambda: not one.answers.empty())
-        found = one.answers.get()
-        assert isinstance(found, KernelBuildError)
-        assert (found.message, found.status) == ("no such function", STATUS_BAD_INPUT)
-        assert len(link.serving) == 2
-
-    asyncio.run(main())
+@in_a_loop
+async def test_mistakes_of_the_formula_leave_nobody_out(job: Job) -> None:
+    error = KernelBuildError("no such function", status=STATUS_BAD_INPUT)
+    client = Played(lambda item: tasks.Failure.of(error, "tcp://host:0"))
+    link = linked(client, [member(0, job.device), member(1, job.device)])
+    own = dispatcher(lambda: asyncio.sleep(0, link))
+    own._use(link)
+    one = work(job)
+    own.give(one)
+    await until(lambda: not one.answers.empty())
+    found = one.answers.get()
+    assert isinstance(found, KernelBuildError)
+    assert (found.message, found.status) == ("no such function", STATUS_BAD_INPUT)
+    assert len(link.serving) == 2
 
 
 @pytest.mark.parametrize("problem", [OSError("refused"), RuntimeError("half started"), ValueError("what?")])
-def test_any_failure_to_connect_again_is_tried_again(job: Job, problem: Exception) -> None:
+@in_a_loop
+async def test_any_failure_to_connect_again_is_tried_again(job: Job, problem: Exception) -> None:
     """A scheduler that is about to start may answer anything."""
+    told: list[str] = []
+    tries = iter([problem, problem])
+    link = linked(Played(lambda item: None), [member(0, job.device)])
 
-    async def main() -> None:
-        told: list[str] = []
-        tries = iter([problem, problem])
-        link = linked(Played(lambda item: None), [member(0, job.device)])
+    async def open_link() -> Link:
+        failed = next(tries, None)
+        if failed is not None:
+            raise failed
+        return link
 
-        async def open_link() -> Link:
-            failed = next(tries, None)
-            if failed is not None:
-                raise failed
-            return link
-
-        own = dispatcher(open_link, told)
-        await own._again(linked(Played(lambda item: None), []))
-        assert (own.link, own.error) == (link, None)
-        assert told == ["tcp://farm:1: the scheduler is back"]
-
-    asyncio.run(main())
+    own = dispatcher(open_link, told)
+    await own._again(linked(Played(lambda item: None), []))
+    assert (own.link, own.error) == (link, None)
+    assert told == ["tcp://farm:1: the scheduler is back"]

@@ -6,6 +6,7 @@ import os
 import random
 import signal
 import subprocess
+import sys
 import time
 from pathlib import Path
 
@@ -17,9 +18,16 @@ from clfractal.files.exr import read_exr
 from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows
 from tests.cluster.kills import kill_at_random
 from tests.interrupts import planes
-from tests.shell import command, environment, process, works
+from tests.shell import Running, command, environment, process, wait_until, works
 
 resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")
+
+
+def impatient(folder: Path, seconds: float, *order: str) -> Running:
+    """The program, which waits no minute for what has gone: that is long for a test."""
+    shorter = f"from clfractal.cluster import dispatch; dispatch.RETURN_SECONDS = {seconds}"
+    program = f"{shorter}; from clfractal.cli import main; main()"
+    return Running(folder, words=[sys.executable, "-P", "-c", program, *order])
 
 
 def test_workers_killed_during_a_picture(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
@@ -59,21 +67,12 @@ def test_the_scheduler_returns(folder: Path, farm: Farm, picture: dict[str, byte
 
 def test_the_scheduler_does_not_return(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
     """One line, status 3; the journal is kept, and one machine ends what a cluster began."""
-    # (A minute is long for a test: the program is told a shorter one.)
-    shorter = "from clfractal.cluster import dispatch; dispatch.RETURN_SECONDS = 2.0"
-    program = f"{shorter}; from clfractal.cli import main; main()"
-    order = command("render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", farm.address)
-    running = subprocess.Popen(
-        [order[0], "-c", program, *order[order.index("render") :]],
-        cwd=folder,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    order = ("render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", farm.address)
+    running = impatient(folder, 2.0, *order)
     journal_grows(folder)
     farm.kill_scheduler()
-    _, told = running.communicate(timeout=60)
-    assert running.returncode == 3
+    status, told = running.ended_by()
+    assert status == 3
     assert told == f"{farm.address}: the scheduler is gone, and did not return in time\n"
     works(process(["render", "heavy.yaml", "-o", "out.exr", "--resume", "--stats", "s.json"], folder))
     assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
@@ -141,9 +140,7 @@ def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> Non
     """A tile of minutes: its worker ends it as soon as nobody wants it."""
     order = ["render", "heavy.yaml", "--set", "renderer.samples=20000", "-o", "out.exr"]
     with Client(folder, *order, "--cluster", farm.address) as client:
-        deadline = time.monotonic() + 60
-        while not _at_work(farm) and time.monotonic() < deadline:
-            time.sleep(0.2)
+        wait_until(lambda: _at_work(farm), seconds=60)
         time.sleep(2)
         assert _at_work(farm)
         start = time.monotonic()
@@ -248,21 +245,12 @@ def test_the_last_worker_with_float64_is_lost(folder: Path, farm: Farm) -> None:
     farm.add(preload=WITHOUT_FLOAT64)
     order = ["render", "heavy.yaml", "--precision", "float64", "--samples", "100", "-o", "out.exr"]
     order += ["--cluster", farm.address]
-    shorter = "from clfractal.cluster import dispatch; dispatch.RETURN_SECONDS = 3.0"
-    program = f"{shorter}; from clfractal.cli import main; main()"
-    whole = command(*order)
-    running = subprocess.Popen(
-        [whole[0], "-c", program, *whole[whole.index("render") :]],
-        cwd=folder,
-        env=environment(),
-        stderr=subprocess.PIPE,
-        text=True,
-    )
+    running = impatient(folder, 3.0, *order)
     journal_grows(folder)
     for name in ("w0", "w1"):
         farm.kill(name)
-    _, told = running.communicate(timeout=60)
-    assert running.returncode == 3
+    status, told = running.ended_by()
+    assert status == 3
     lines = [line for line in told.splitlines() if line.startswith(farm.address)]
     assert lines == [
         f"{farm.address}: no worker with float64 is left; waiting 3 s for one",
