@@ -127,12 +127,12 @@ class Running:
     def wait_until(self, ready: Callable[[], bool]) -> None:
         wait_until(ready, self.process)
 
-    def ended_by(self, *signals: signal.Signals) -> tuple[int, str]:
+    def ended_by(self, *signals: signal.Signals, seconds: float = 60) -> tuple[int, str]:
         """Sends the signals; gives status and standard error."""
         for each in signals:
             self.process.send_signal(each)
         try:
-            told = self.process.communicate(timeout=60)[1]
+            told = self.process.communicate(timeout=seconds)[1]
         finally:
             if self.process.poll() is None:
                 os.killpg(self.process.pid, signal.SIGKILL)

@@ -63,9 +63,6 @@ def test_wrong_arguments_of_a_render(settings: dict[str, Any], message: str) -> 
 
 
 def test_wrong_arguments_of_an_engine() -> None:
-    refused(lambda: clfractal.Engine(3), "device: must be text")  # type: ignore[arg-type]
-    refused(lambda: clfractal.Engine(budget_seconds=0), "budget_seconds: must be at least 0.0001, got 0")
-    refused(lambda: clfractal.Engine(tell="yes"), "tell: must be a function")  # type: ignore[arg-type]
     with clfractal.Engine() as engine:
         wrong: Any = "stop"
         refused(lambda: engine.render(SCENE, token=wrong), "token: must be a CancelToken, got 'stop'")
@@ -234,50 +231,56 @@ def test_wrong_questions_about_points(settings: dict[str, Any], message: str) ->
         refused(lambda: clfractal.distances(**asked), message)
 
 
-def test_other_functions_name_their_arguments() -> None:
-    wrong: Any = 5
-    scene = clfractal.load_scene(SCENE)
-    refused(lambda: clfractal.load_scene(wrong), "scene: must be a path, YAML text or a mapping, got 5")
-    refused(
-        lambda: clfractal.load_scene(SCENE, overrides="camera.fov=3"), "overrides: must be a list of texts"
-    )
-    refused(lambda: clfractal.load_scene(SCENE, folder=wrong), "folder: must be a path, got 5")
-    refused(lambda: clfractal.render(wrong), "scene: must be a path")
-    refused(lambda: clfractal.dump_scene(wrong), "scene: must be a Scene, got 5")
-    refused(lambda: clfractal.variations(wrong), "scene: must be a path, YAML text or a mapping")
-    refused(lambda: clfractal.variations(scene, count=2.5), "count: must be a whole number")  # type: ignore[arg-type]
-    refused(lambda: clfractal.variations(scene, seed=wrong / 2), "seed: must be a whole number, got 2.5")
-    refused(
-        lambda: clfractal.variations(scene, strength=wrong),
+WRONG: Any = 5
+SOURCE: Any = clfractal.load_scene(SCENE)
+CALLS: list[tuple[Callable[[], object], str]] = [
+    (lambda: clfractal.load_scene(WRONG), "scene: must be a path, YAML text or a mapping, got 5"),
+    (lambda: clfractal.load_scene(SCENE, overrides="camera.fov=3"), "overrides: must be a list of texts"),
+    (lambda: clfractal.load_scene(SCENE, folder=WRONG), "folder: must be a path, got 5"),
+    (lambda: clfractal.render(WRONG), "scene: must be a path"),
+    (lambda: clfractal.dump_scene(WRONG), "scene: must be a Scene, got 5"),
+    (lambda: clfractal.variations(WRONG), "scene: must be a path, YAML text or a mapping, got 5"),
+    (lambda: clfractal.variations(SOURCE, count=WRONG / 2), "count: must be a whole number"),
+    (lambda: clfractal.variations(SOURCE, seed=WRONG / 2), "seed: must be a whole number, got 2.5"),
+    (
+        lambda: clfractal.variations(SOURCE, strength=WRONG),
         "strength: must be slight, medium or heavy, got 5",
-    )
-    refused(lambda: clfractal.variations(scene, kinds=["colour"]), "kinds: unknown kind 'colour'")  # type: ignore[list-item]
-    refused(lambda: clfractal.variations(scene, locked="camera"), "locked: must be a list of texts")
-    refused(lambda: clfractal.voxelize(wrong), "scene: must be a path")
-    refused(lambda: clfractal.voxelize(scene, resolution=2.5), "resolution: must be")  # type: ignore[arg-type]
-    refused(
-        lambda: clfractal.voxelize(scene, precision=wrong),
+    ),
+    (lambda: clfractal.variations(SOURCE, kinds=["colour"]), "kinds: unknown kind 'colour'"),  # type: ignore[list-item]
+    (lambda: clfractal.variations(SOURCE, locked="camera"), "locked: must be a list of texts"),
+    (lambda: clfractal.voxelize(WRONG), "scene: must be a path"),
+    (lambda: clfractal.voxelize(SOURCE, resolution=WRONG / 2), "resolution: must be"),
+    (
+        lambda: clfractal.voxelize(SOURCE, precision=WRONG),
         "precision: must be auto, float32 or float64, got 5",
-    )
-    refused(lambda: clfractal.mesh(scene, level=float("nan")), "level: must be a finite number")
-    refused(lambda: clfractal.mesh(scene, close=wrong), "close: must be true or false, got 5")
-    refused(
+    ),
+    (lambda: clfractal.mesh(SOURCE, level=float("nan")), "level: must be a finite number"),
+    (lambda: clfractal.mesh(SOURCE, close=WRONG), "close: must be true or false, got 5"),
+    (
         lambda: clfractal.distances("mandelbulb", POINTS, iterations=0),
         "iterations: must be from 1 to 1000000",
-    )
+    ),
+    (lambda: clfractal.Engine(WRONG), "device: must be text"),
+    (lambda: clfractal.Engine(budget_seconds=0), "budget_seconds: must be at least 0.0001, got 0"),
+    (lambda: clfractal.Engine(tell=WRONG), "tell: must be a function"),
+    (lambda: camera.frame(WRONG), "scene: must be a Scene, as load_scene gives it, got 5"),
+    (lambda: camera.angles(WRONG), "scene: must be a Scene, as load_scene gives it, got 5"),
+    (lambda: camera.turn(SOURCE, azimuth="a"), "azimuth: must be a number, got 'a'"),  # type: ignore[arg-type]
+    (
+        lambda: camera.turn(SOURCE, elevation=float("nan")),
+        "elevation: must be a finite number, got nan",
+    ),
+    (lambda: camera.roll(SOURCE, "a"), "camera.roll: must be a number, got 'a'"),  # type: ignore[arg-type]
+]
 
 
-def test_moves_of_a_camera_name_their_arguments() -> None:
-    scene: Any = clfractal.load_scene(SCENE)
-    wrong: Any = "a"
-    for call, message in (
-        (lambda: camera.frame(wrong), "scene: must be a Scene, as load_scene gives it, got 'a'"),
-        (lambda: camera.angles(wrong), "scene: must be a Scene, as load_scene gives it, got 'a'"),
-        (lambda: camera.turn(scene, azimuth=wrong), "azimuth: must be a number, got 'a'"),
-        (lambda: camera.turn(scene, elevation=float("nan")), "elevation: must be a finite number, got nan"),
-        (lambda: camera.roll(scene, wrong), "camera.roll: must be a number, got 'a'"),
-    ):
-        refused(call, message)
+@pytest.mark.parametrize(("call", "message"), CALLS)
+def test_other_functions_name_their_arguments(call: Callable[[], object], message: str) -> None:
+    refused(call, message)
+
+
+def test_moves_of_a_camera_take_numbers_of_numpy() -> None:
+    scene = SOURCE
     turned = camera.turn(scene, azimuth=np.float32(90))  # type: ignore[arg-type]
     assert camera.angles(turned)[0] == pytest.approx(camera.angles(scene)[0] + 90)
 

@@ -78,24 +78,28 @@ def completed_by(shell: str, script: str, folder: Path) -> str:
     return ended.stdout
 
 
-@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
-def test_bash_itself(tmp_path: Path) -> None:
-    script = (
-        "source ~/.bashrc; complete -p clfractal >/dev/null || exit 1; COMP_WORDS=(clfractal vo); COMP_CWORD=1;"
-        " _clfractal_completion clfractal; echo ${COMPREPLY[@]}"
-    )
-    assert completed_by("bash", script, tmp_path) == "voxelize\n"
-
-
-@pytest.mark.skipif(shutil.which("fish") is None, reason="needs fish")
-def test_fish_itself(tmp_path: Path) -> None:
-    assert completed_by("fish", 'complete -C "clfractal vo"', tmp_path).startswith("voxelize\t")
-
-
-@pytest.mark.skipif(shutil.which("zsh") is None, reason="needs zsh")
-def test_zsh_itself(tmp_path: Path) -> None:
-    script = "source ~/.zshrc; whence -w _clfractal; print ${_comps[clfractal]}"
-    assert completed_by("zsh", script, tmp_path) == "_clfractal: function\n_clfractal\n"
+@pytest.mark.parametrize(
+    ("shell", "script", "wanted"),
+    [
+        (
+            "bash",
+            "source ~/.bashrc; complete -p clfractal >/dev/null || exit 1; COMP_WORDS=(clfractal vo); COMP_CWORD=1;"
+            " _clfractal_completion clfractal; echo ${COMPREPLY[@]}",
+            "voxelize\n",
+        ),
+        ("fish", 'complete -C "clfractal vo"', "voxelize\t"),
+        (
+            "zsh",
+            "source ~/.zshrc; whence -w _clfractal; print ${_comps[clfractal]}",
+            "_clfractal: function\n_clfractal\n",
+        ),
+    ],
+)
+def test_shells_themselves(shell: str, script: str, wanted: str, tmp_path: Path) -> None:
+    if shutil.which(shell) is None:
+        pytest.skip(f"needs {shell}")
+    found = completed_by(shell, script, tmp_path)
+    assert found.startswith(wanted) if shell == "fish" else found == wanted
 
 
 def test_a_shell_without_completion_is_told_which_have_one(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import shlex
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -24,6 +25,36 @@ from clfractal.files.watching import Watched
 from clfractal.scene.load import load_scene
 from tests.shell import SCENE, InProcess, works
 
+REFUSED = {
+    "scenes abalon": "unknown scene 'abalon'; did you mean 'abalone'?",
+    "scenes a b": "prints one scene, got 2",
+    "scenes abalon --sheet s.png": "did you mean 'abalone'?",
+    "scenes --sheet s.gif": "s.gif: unknown extension '.gif'",
+    "new x --formula mandelbub": "--formula: unknown formula 'mandelbub'; did you mean 'mandelbulb'?",
+    "new x --formula ../f.yaml": "--formula: must lie in the folder of the scene",
+    "new x --formula f.yaml": "f.yaml:",
+    "new none/x": "none",
+    **{f"new {name}": "NAME: must name a file" for name in ("''", ".", "..", "/")},
+    "watch none.yaml": "none.yaml: cannot be read",
+    "watch scene.yaml --size big": "--size: must be WIDTHxHEIGHT",
+    "watch scene.yaml --set camera.fow=3": "--set camera.fow: unknown key",
+    "watch scene.yaml --quality god": "--quality: unknown quality 'god'",
+    "watch scene.yaml --device abacus": "abacus",
+    # What no change of the scene can mend: waiting for one would be in vain.
+    "watch scene.yaml -o scene.yaml": "scene.yaml: unknown extension",
+    "watch scene.yaml -o none/out.png": "there is no folder 'none'",
+    "watch scene.png": "scene.png: would be overwritten",
+}
+
+
+@pytest.mark.parametrize("line", REFUSED)
+def test_what_is_refused(clf: InProcess, line: str) -> None:
+    Path("f.yaml").write_text("variables: [x, y, z]\nmap: [x +, y, z]\n")
+    Path("scene.png").write_text(SCENE)
+    assert clf(*shlex.split(line)).is_one_line(2, REFUSED[line])
+    assert sorted(path.name for path in Path().iterdir()) == ["f.yaml", "scene.png", "scene.yaml"]
+
+
 # --- scenes ---
 
 
@@ -35,14 +66,6 @@ def test_every_scene_has_a_line_and_a_text(clf: InProcess) -> None:
         assert len(line.split(maxsplit=1)[1]) > 10
     for name in ("abalone", "cut_geode"):
         assert clf("scenes", name).out == scenes_command.scene_files()[name].read_text("utf-8")
-
-
-def test_scenes_that_are_not_there(clf: InProcess) -> None:
-    assert clf("scenes", "abalon").is_one_line(2, "unknown scene 'abalon'; did you mean 'abalone'?")
-    assert clf("scenes", "a", "b").is_one_line(2, "prints one scene, got 2")
-    assert clf("scenes", "abalon", "--sheet", "s.png").is_one_line(2, "did you mean 'abalone'?")
-    assert clf("scenes", "--sheet", "s.gif").is_one_line(2, "s.gif: unknown extension '.gif'")
-    assert not Path("s.png").exists()
 
 
 def test_a_sheet_goes_on_where_it_was_interrupted(
@@ -125,20 +148,6 @@ def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess, formula
     assert seen.mean() > 0.6
     assert np.median(film["Z"][seen]) > 0.1 * radius
     assert film.remarks == ()
-
-
-def test_what_new_refuses(clf: InProcess) -> None:
-    wrong = "--formula: unknown formula 'mandelbub'; did you mean 'mandelbulb'?"
-    assert clf("new", "x", "--formula", "mandelbub").is_one_line(2, wrong)
-    assert clf("new", "x", "--formula", "../f.yaml").is_one_line(
-        2, "--formula: must lie in the folder of the scene"
-    )
-    Path("f.yaml").write_text("variables: [x, y, z]\nmap: [x +, y, z]\n")
-    assert clf("new", "x", "--formula", "f.yaml").is_one_line(2, "f.yaml:")
-    assert clf("new", "none/x").is_one_line(2, "none")
-    for name in ("", ".", "..", "/"):
-        assert clf("new", name).is_one_line(2, "NAME: must name a file")
-    assert sorted(path.name for path in Path().iterdir()) == ["f.yaml", "scene.yaml"]
 
 
 def test_commands_in_a_new_scene_can_be_copied() -> None:
@@ -227,23 +236,6 @@ def test_a_change_ends_a_render(tmp_path: Path) -> None:
     assert cancelled == [False, True]
     with watch._ended_by_change(Watched([file], interval=0.01)) as token:
         assert not token.cancelled
-
-
-def test_what_watch_refuses_at_once(clf: InProcess) -> None:
-    assert clf("watch", "none.yaml").is_one_line(2, "none.yaml: cannot be read")
-    assert clf("watch", "scene.yaml", "--size", "big").is_one_line(2, "--size: must be WIDTHxHEIGHT")
-    assert clf("watch", "scene.yaml", "--set", "camera.fow=3").is_one_line(2, "--set camera.fow: unknown key")
-    assert clf("watch", "scene.yaml", "--quality", "god").is_one_line(2, "--quality: unknown quality 'god'")
-    assert clf("watch", "scene.yaml", "--device", "abacus").is_one_line(2, "abacus")
-    # What no change of the scene can mend: waiting for one would be in vain.
-    for output, message in (
-        ("scene.yaml", "scene.yaml: unknown extension"),
-        ("none/out.png", "there is no folder 'none'"),
-    ):
-        assert clf("watch", "scene.yaml", "-o", output).is_one_line(2, message)
-    assert [path.name for path in Path().iterdir()] == ["scene.yaml"]
-    Path("scene.yaml").rename("scene.png")
-    assert clf("watch", "scene.png").is_one_line(2, "scene.png: would be overwritten")
 
 
 # --- quality ---

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from tests.shell import command, environment, has_bytes, wait_until
+from tests.shell import Running, environment, has_bytes, wait_until
 
 # Work of some ten seconds of one core, in tiles of a tenth of a second.
 HEAVY = """version: 1
@@ -148,19 +148,8 @@ def end(process: subprocess.Popen[Any]) -> None:
     process.wait(10)
 
 
-class Client:
+class Client(Running):
     """A run of the program that goes on while the test does something to the cluster."""
-
-    def __init__(self, folder: Path, *arguments: str) -> None:
-        self.process = subprocess.Popen(
-            command(*arguments),
-            cwd=folder,
-            env=environment(),
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            start_new_session=True,
-        )
 
     def __enter__(self) -> Self:
         return self
@@ -172,8 +161,7 @@ class Client:
 
     def ended(self, seconds: float = 120) -> tuple[int, str]:
         """The status, and what was printed to standard error."""
-        _, told = self.process.communicate(timeout=seconds)
-        return self.process.returncode, told
+        return self.ended_by(seconds=seconds)
 
     @property
     def running(self) -> bool:

@@ -100,20 +100,34 @@ def test_every_listed_device_can_be_chosen_by_its_index() -> None:
         assert select.by_key(info.index, info.key).info == info
 
 
-def test_gpu_goes_before_cpu(there: pytest.MonkeyPatch) -> None:
-    _let_there_be(there, _INTEL, _POCL, _GPU)
-    assert choose().info == _GPU
-    assert choose("cpu").info == _INTEL
-    assert choose("gpu").info == _GPU
+_ALL_KINDS = (_POCL, _NEWER_POCL, _INTEL, _GPU)
 
 
-def test_cpu_runtimes_by_experience(there: pytest.MonkeyPatch) -> None:
-    _let_there_be(there, _POCL, _OCLGRIND, _NEWER_POCL, _INTEL)
-    assert choose().info == _INTEL
-    _let_there_be(there, _POCL, _OCLGRIND, _NEWER_POCL)
-    assert choose().info == _NEWER_POCL
-    _let_there_be(there, _NEWER_POCL, _POCL_10, _POCL)
-    assert choose().info == _POCL_10
+@pytest.mark.parametrize(
+    ("infos", "spec", "chosen"),
+    [
+        # A GPU goes before a processor.
+        ((_INTEL, _POCL, _GPU), None, _GPU),
+        ((_INTEL, _POCL, _GPU), "cpu", _INTEL),
+        ((_INTEL, _POCL, _GPU), "gpu", _GPU),
+        # Runtimes for processors by experience.
+        ((_POCL, _OCLGRIND, _NEWER_POCL, _INTEL), None, _INTEL),
+        ((_POCL, _OCLGRIND, _NEWER_POCL), None, _NEWER_POCL),
+        ((_NEWER_POCL, _POCL_10, _POCL), None, _POCL_10),
+        # By a part of a name in any case.
+        (_ALL_KINDS, "nvidia", _GPU),
+        (_ALL_KINDS, "h200", _GPU),
+        (_ALL_KINDS, "INTEL", _INTEL),
+        (_ALL_KINDS, "portable computing", _NEWER_POCL),
+        (_ALL_KINDS, "debian", _NEWER_POCL),  # the version, where no name fits
+        (_ALL_KINDS, "0:0", _POCL),
+    ],
+)
+def test_what_is_chosen(
+    there: pytest.MonkeyPatch, infos: tuple[DeviceInfo, ...], spec: str | None, chosen: DeviceInfo
+) -> None:
+    _let_there_be(there, *infos)
+    assert choose(spec).info == chosen
 
 
 def test_measured_speed_goes_before_experience_where_all_are_measured(there: pytest.MonkeyPatch) -> None:
@@ -136,16 +150,6 @@ def test_a_simulator_is_only_taken_by_name(there: pytest.MonkeyPatch) -> None:
     assert caught.value.status == 3
     with pytest.raises(DeviceError, match="no device 'cpu'"):
         choose("cpu")
-
-
-def test_by_part_of_a_name_in_any_case(there: pytest.MonkeyPatch) -> None:
-    _let_there_be(there, _POCL, _NEWER_POCL, _INTEL, _GPU)
-    assert choose("nvidia").info == _GPU
-    assert choose("h200").info == _GPU
-    assert choose("INTEL").info == _INTEL
-    assert choose("portable computing").info == _NEWER_POCL
-    assert choose("debian").info == _NEWER_POCL, "the version, where no name fits"
-    assert choose("0:0").info == _POCL
 
 
 def test_the_environment_variable_counts_less_than_the_flag(there: pytest.MonkeyPatch) -> None:
