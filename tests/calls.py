@@ -1,15 +1,16 @@
-"""Functions whose calls are noted."""
+"""Functions whose calls are noted, and functions that fail."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any, NoReturn
 
 import pytest
 
 
-def counted(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[object]:
-    """Notes the calls of a function."""
-    calls: list[object] = []
+def counted(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[tuple[Any, ...]]:
+    """Notes the calls of a function: the arguments that have no names."""
+    calls: list[tuple[Any, ...]] = []
     before: Callable[..., object] = getattr(owner, name)
 
     def noted(*arguments: object, **settings: object) -> object:
@@ -18,3 +19,12 @@ def counted(monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> list[o
 
     monkeypatch.setattr(owner, name, noted)
     return calls
+
+
+def raising(error: BaseException | type[BaseException]) -> Callable[..., NoReturn]:
+    """A function that fails, whatever it is given."""
+
+    def fail(*_: object, **__: object) -> NoReturn:
+        raise error
+
+    return fail

@@ -14,6 +14,7 @@ from clfractal.cli import progress
 from clfractal.device import drivers_folder, program, select
 from clfractal.integrators import surface
 from clfractal.integrators.kernel import ProgramText
+from tests.calls import raising
 from tests.files.limits import file_size_limit
 from tests.shell import SCENE, InProcess, command, environment, python, works
 
@@ -256,11 +257,8 @@ def test_no_room_for_what_the_compiler_is_told(here: Path, clf: InProcess) -> No
 def test_no_room_for_temporary_files(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
     """The folder is named that has none, and not one in it whose name nobody knows."""
 
-    def full(path: Path, *_: object, **__: object) -> int:
-        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-
     with monkeypatch.context() as patch:
-        patch.setattr(Path, "write_text", full)
+        patch.setattr(Path, "write_text", raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))))
         ended = clf("render", "scene.yaml", "-o", "old.png", "--quiet")
     assert ended.is_one_line(
         2, f"{drivers_folder.path().parent}: has no room for temporary files: No space left"
@@ -364,10 +362,7 @@ def test_a_driver_that_aborts(here: Path, clf: InProcess, monkeypatch: pytest.Mo
 def test_a_mistake_of_ours_is_one_line_too(
     here: Path, clf: InProcess, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def fails(*_arguments: object) -> None:
-        raise IndexError("of an array\nwith two lines")
-
-    monkeypatch.setattr(surface, "program_texts", fails)
+    monkeypatch.setattr(surface, "program_texts", raising(IndexError("of an array\nwith two lines")))
     ended = clf("render", "scene.yaml", "-o", "old.png")
     assert ended.is_one_line(3, "internal error", "IndexError: of an array with two lines")
     assert "Traceback" in clf("render", "scene.yaml", "-o", "old.png", "--verbose").err

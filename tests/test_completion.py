@@ -13,6 +13,7 @@ import pytest
 
 from clfractal.cli.program import app
 from clfractal.formulas import catalog
+from tests.calls import raising
 from tests.makers import DOCS, maker
 from tests.shell import InProcess, command, environment, process, works
 
@@ -110,10 +111,7 @@ def test_a_shell_without_completion_is_told_which_have_one(
     monkeypatch.setattr(shellingham, "detect_shell", lambda: ("tcsh", "/bin/tcsh"))
     assert clf("--show-completion").is_one_line(2, "--show-completion: is for bash, zsh, fish", "is tcsh")
 
-    def none() -> None:
-        raise shellingham.ShellDetectionFailure
-
-    monkeypatch.setattr(shellingham, "detect_shell", none)
+    monkeypatch.setattr(shellingham, "detect_shell", raising(shellingham.ShellDetectionFailure))
     assert clf("--install-completion").is_one_line(2, "--install-completion: is for bash", "none was found")
 
 

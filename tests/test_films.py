@@ -18,6 +18,7 @@ from clfractal.errors import ClfractalError, FileError
 from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, Recipe
 from clfractal.files.moving import plan_film, write_film, ycbcr
 from clfractal.files.png import read_form, write_png
+from tests.calls import raising
 from tests.shell import InProcess, works
 
 SIZE = (128, 96)
@@ -162,11 +163,8 @@ def test_a_film_from_the_shell(clf: InProcess) -> None:
 def interrupted(clf: InProcess, *options: str) -> None:
     """All frames are made, and the film is not."""
 
-    def interrupt(*_: object) -> None:
-        raise KeyboardInterrupt
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("clfractal.files.moving._frame", interrupt)
+        patch.setattr("clfractal.files.moving._frame", raising(KeyboardInterrupt))
         with pytest.raises(KeyboardInterrupt):
             clf("animate", "scene.yaml", *options)
 

@@ -18,6 +18,7 @@ from clfractal.device.select import choose, has_float64
 from clfractal.files.file_kinds import Kind, kind_of
 from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_volume
 from clfractal.scene.grid_values import finite_range, in_words, is_finite_somewhere, lacking
+from tests.calls import raising
 from tests.shell import SCENE, InProcess, works
 
 # z stays where it is: the set is the ball of the bailout's radius, 0.8 around the origin.
@@ -84,11 +85,8 @@ def test_arguments_replace_the_scenes(ball: clfractal.Volume) -> None:
     assert stages
     assert all(0 <= part <= 1 for _, part in stages)
 
-    def stop(stage: str, part: float) -> None:
-        raise TimeoutError
-
     with pytest.raises(TimeoutError):
-        clfractal.voxelize(BALL, progress=stop)
+        clfractal.voxelize(BALL, progress=raising(TimeoutError))
     with pytest.raises(clfractal.SceneError, match=r"renderer.resolution: .* are left"):
         clfractal.voxelize({**BALL, "renderer": {"type": "volume", "store": "float"}}, resolution=16384)
 

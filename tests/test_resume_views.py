@@ -17,6 +17,7 @@ from clfractal.engine import finish
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import Progress, run
 from clfractal.images.compose import Side
+from tests.calls import raising
 from tests.interrupts import planes, watched
 from tests.shell import Ended, InProcess, works
 
@@ -240,11 +241,8 @@ def test_nothing_is_left(here: Path, clf: InProcess, monkeypatch: pytest.MonkeyP
     """The disk was full when the files were written: all tiles are there, and none is rendered again."""
     begun("pair")
 
-    def full(*_: object, **__: object) -> None:
-        raise OSError(28, "No space left on device")
-
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(finish, "save_outputs", full)
+        patch.setattr(finish, "save_outputs", raising(OSError(28, "No space left on device")))
         assert render(clf).status == 2
     seen = watched(monkeypatch)
     ended = works(clf("render", "scene.yaml", "-o", "out.exr", "--resume", "--stats", "stats.json"))

@@ -15,7 +15,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -25,6 +24,7 @@ from clfractal.device.select import Device, choose, is_pocl
 from clfractal.engine import thumbnails
 from clfractal.errors import CacheWarning, DeviceError, FileError, UntriedError
 from clfractal.integrators import lanes
+from tests.calls import raising
 from tests.interrupts import planes
 from tests.shell import SCENE, Ended, command, environment, process, works
 
@@ -242,8 +242,7 @@ def test_a_full_disk(good: Path, tmp_path: Path, size: str, known: tuple[str, ..
     assert planes(tmp_path / "b.exr") == planes(good / "a.exr")
 
 
-def no_space(*_: object, **__: object) -> Any:
-    raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+no_space = raising(OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
 
 
 @pytest.fixture
@@ -312,11 +311,8 @@ def test_only_what_a_device_does_is_remembered(
 ) -> None:
     kind = DeviceError if of_the_device else UntriedError
 
-    def fail(*_: object, **__: object) -> Any:
-        raise kind("aborted")
-
     with monkeypatch.context() as patch:
-        patch.setattr(isolate, "run", fail)
+        patch.setattr(isolate, "run", raising(kind("aborted")))
         patch.setattr(lanes, "_reports", {})
         with pytest.raises(DeviceError, match=r"no kernel works on this device: 1\d? lanes: aborted$"):
             lanes.march_reports(device, "float32")

@@ -19,6 +19,7 @@ from clfractal.device.compiler import Argument, Warm
 from clfractal.device.program import build
 from clfractal.device.select import Device, is_pocl
 from clfractal.errors import FileError
+from tests.calls import raising
 from tests.shell import Running, environment
 
 # A process that has the folder, says so, and waits.
@@ -117,11 +118,9 @@ def test_it_is_in_the_cache_where_the_temporary_folder_does_not_serve(
     elif cause == "noexec":
         monkeypatch.setattr(drivers_folder, "_may_run_programs", lambda base: not is_temporary(base))
     else:
-
-        def fail(_: str = "") -> Path:
-            raise OSError(28, "No space left on device")
-
-        monkeypatch.setattr(cache_folder, "private_temporary", fail)
+        monkeypatch.setattr(
+            cache_folder, "private_temporary", raising(OSError(28, "No space left on device"))
+        )
     assert drivers_folder.path().is_relative_to(fresh / "cache")
 
 
@@ -151,11 +150,8 @@ def test_a_chosen_folder(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_no_folder_at_all(fresh: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    def fail(_: str = "") -> Path:
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(cache_folder, "private_temporary", fail)
-    monkeypatch.setattr(cache_folder, "folder", fail)
+    monkeypatch.setattr(cache_folder, "private_temporary", raising(OSError(28, "No space left on device")))
+    monkeypatch.setattr(cache_folder, "folder", raising(OSError(28, "No space left on device")))
     with pytest.raises(FileError, match=r"drivers have no folder to write into: "):
         drivers_folder.path()
 

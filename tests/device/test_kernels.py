@@ -15,7 +15,8 @@ from clfractal.device import program
 from clfractal.device.kernels import Lease
 from clfractal.device.loaded import MOST, MOST_RESTING, LoadedPrograms
 from clfractal.device.program import Program
-from clfractal.device.select import Device, choose
+from clfractal.device.select import choose
+from tests.calls import counted
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -73,32 +74,12 @@ def test_kernels_go_with_their_program() -> None:
     assert loaded.take_kernels(MOST_RESTING + 3) is None
 
 
-def made(monkeypatch: pytest.MonkeyPatch) -> list[str]:
-    """The names of all kernels that are made from now on."""
-    names: list[str] = []
-    make = Program.kernel
-
-    def counting(self: Program, name: str) -> Any:
-        names.append(name)
-        return make(self, name)
-
-    monkeypatch.setattr(Program, "kernel", counting)
-    return names
-
-
 def test_an_engine_that_changes_between_formulas_makes_kernels_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    names = made(monkeypatch)
-    builds: list[str] = []
-    build = program.build
-
-    def counted(device: Device, text: str, **settings: Any) -> Program:
-        builds.append(text)
-        return build(device, text, **settings)
-
+    names = counted(monkeypatch, Program, "kernel")
     with clfractal.Engine() as engine:
         first = [engine.render(scene) for scene in (SCENE, HAST)]
         names.clear()
-        monkeypatch.setattr(program, "build", counted)
+        builds = counted(monkeypatch, program, "build")
         for _ in range(3):
             for scene, film in zip((SCENE, HAST), first, strict=True):
                 np.testing.assert_array_equal(engine.render(scene)["R"], film["R"])
@@ -117,7 +98,7 @@ def test_pictures_points_and_grids_without_an_engine_make_kernels_once(
         clfractal.voxelize(grid)
 
     course()
-    names = made(monkeypatch)
+    names = counted(monkeypatch, Program, "kernel")
     course()
     assert names == []
 

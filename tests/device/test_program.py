@@ -20,6 +20,7 @@ from clfractal.device.program import Program, build, math_flags
 from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
 from clfractal.errors import DeviceError, KernelBuildError
+from tests.calls import raising
 
 pytestmark = pytest.mark.conformance
 
@@ -62,13 +63,10 @@ def test_a_program_in_memory_needs_no_disk(
     text = _TRIPLE + "// as long as the program of a scene\n" * 6000
     first = build(device, text, flags=_FLAGS, warm=[_WARM], isolated=False)
 
-    def fail(*_: object) -> None:
-        raise AssertionError("the disk or the compiler was asked")
-
     for name in ("load_blob", "store_blob"):
-        monkeypatch.setattr(cache, name, fail)
+        monkeypatch.setattr(cache, name, raising(AssertionError("the disk or the compiler was asked")))
     for name in ("compile_source", "load_kept"):
-        monkeypatch.setattr(compiler, name, fail)
+        monkeypatch.setattr(compiler, name, raising(AssertionError("the disk or the compiler was asked")))
     again = [build(device, text, flags=_FLAGS, warm=[_WARM]) for _ in range(20)]
     assert all(each.cached and each.cl_program is first.cl_program for each in again)
     assert statistics.median(each.build_ms for each in again) < 1

@@ -32,6 +32,7 @@ from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.passes import SAMPLING
 from clfractal.integrators.plan import Plan
 from clfractal.scene.model import Scene
+from tests.calls import raising
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
 from tests.render.passes import RENDERERS, SIZE, scene_with
 from tests.render.shots import job_of, plan_of, shoot, stacked
@@ -136,13 +137,10 @@ def test_after_an_error_the_device_is_idle(
 
     monkeypatch.setattr(launch, "_end", noted)
 
-    def stop(_: object) -> None:
-        raise error
-
     scene = changed(BULB, "image.width=640", "image.height=480", "renderer.samples=4")
     with Engine(device, budget_seconds=0.001) as engine:
         with pytest.raises(error) as raised:
-            engine.render(scene, stop)
+            engine.render(scene, raising(error))
         # (The exception is still alive, and with it all frames that it went through.)
         assert raised.value.__traceback__ is not None
         assert ended == [2]

@@ -27,6 +27,7 @@ from clfractal.images.tiled import Floats
 from clfractal.images.tiles import TILE, Region, TileGrid
 from clfractal.integrators.plan import PlannedView
 from clfractal.scene.layout import Place
+from tests.calls import raising
 from tests.engine.canvases import LAYOUT, drawn, job_of, look_of, painted, scene_of, shown
 from tests.scenes import STEREO
 
@@ -94,14 +95,10 @@ def test_without_memory_it_says_so_and_can_be_used_again(
     canvas, job = Canvas(device), job_of(scene_of(), device)
     drawn(job_of(scene_of(*sized(20, 10)), device), device, canvas)
     with monkeypatch.context() as patch:
-        patch.setattr(Device, "buffer", refusing)
+        patch.setattr(Device, "buffer", raising(DeviceError("no room", status=2)))
         with pytest.raises(DeviceError):
             canvas.fit(job.views)
     assert_as_films(drawn(job, device, canvas), job, device)
-
-
-def refusing(*_: object, **__: object) -> None:
-    raise DeviceError("no room", status=2)
 
 
 @pytest.mark.parametrize("divider", [2, 3, 8])

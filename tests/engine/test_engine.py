@@ -21,7 +21,7 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels import fill
-from tests.calls import counted
+from tests.calls import counted, raising
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
 
 CHANGES: dict[str, tuple[str, ...]] = {
@@ -144,11 +144,8 @@ def test_an_engine_goes_on_after_an_error(device: Device) -> None:
         with pytest.raises(SceneError):
             engine.render(changed(BULB), region=(0, 0, 1000, 1))
 
-        def fail(_: object) -> None:
-            raise RuntimeError("a mistake of the caller")
-
         with pytest.raises(RuntimeError):
-            engine.render(changed(BULB), fail)
+            engine.render(changed(BULB), raising(RuntimeError("a mistake of the caller")))
         equal(engine.render(changed(BULB)), clfractal.render(changed(BULB)))
 
 

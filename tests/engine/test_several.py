@@ -9,7 +9,6 @@ from collections.abc import Generator, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -32,6 +31,7 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import lanes
 from clfractal.integrators.lanes import march_reports
 from clfractal.scene.load import load_scene
+from tests.calls import counted
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
@@ -271,21 +271,14 @@ def test_a_program_is_compiled_once_for_devices_of_one_kind(
 ) -> None:
     monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path))
     monkeypatch.setenv("CLFRACTAL_LANES", "8")
-    compiled: list[str] = []
-    compile_in_child = program._compile_in_child
-
-    def counted(chosen: Device, text: str, *rest: Any) -> bytes:
-        compiled.append(text)
-        return compile_in_child(chosen, text, *rest)
-
-    monkeypatch.setattr(program, "_compile_in_child", counted)
+    compiled = counted(monkeypatch, program, "_compile_in_child")
     scene = SCENE.replace("300, height: 200", "3000, height: 2000").replace("iterations: 8", "iterations: 9")
     with Engine(halves_of(device)) as engine:
         for executor in engine.executor.executors:  # type: ignore[union-attr]
             executor.device.loaded.clear()
         framebuffer = engine.render(scene, samples=1)
     assert len(framebuffer.stats["devices"]) == 2
-    assert len(compiled) == len(set(compiled)) > 0
+    assert len(compiled) == len({text for _, text, *_ in compiled}) > 0
 
 
 def test_pictures_whose_samples_differ_are_shared(device: Device) -> None:

@@ -6,7 +6,6 @@ import os
 import re
 import sys
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +18,7 @@ from clfractal.files.exr import library_name, read_exr, write_exr
 from clfractal.files.exr_header import read_header
 from clfractal.files.texture import read_texture
 from clfractal.files.watching import INTERVAL, Watched
+from tests.calls import counted, raising
 from tests.files.limits import file_size_limit
 from tests.shell import InProcess, process
 
@@ -183,12 +183,9 @@ def test_reading_never_waits_for_a_pipe_or_reads_a_device(tmp_path: Path) -> Non
 
 def test_a_disk_that_fails_late_is_noticed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Some file systems find out that there is no room only when the data is brought to the disk.
-    def fail(descriptor: int) -> None:
-        raise OSError(28, "No space left on device")
-
     target = tmp_path / "a.png"
     target.write_bytes(b"old")
-    monkeypatch.setattr(os, "fsync", fail)
+    monkeypatch.setattr(os, "fsync", raising(OSError(28, "No space left on device")))
     with (
         pytest.raises(FileError, match=r"a\.png: cannot be written: No space left on device$"),
         atomic_writer(target) as beside,
@@ -371,18 +368,11 @@ def test_the_disk_is_looked_at_every_half_second_at_most(
 ) -> None:
     now = [0.0]
     watched = Watched(files, clock=lambda: now[0])
-    looks: list[Path] = []
-    stat = os.stat
-
-    def counted(path: Path, **rest: Any) -> os.stat_result:
-        looks.append(path)
-        return stat(path, **rest)
-
-    monkeypatch.setattr(os, "stat", counted)
+    looks = counted(monkeypatch, os, "stat")
     for frame in range(1, 121):  # two seconds
         now[0] = frame / 60
         watched.changed()
-    assert looks.count(files[0]) == 4
+    assert [path for path, *_ in looks].count(files[0]) == 4
 
 
 def test_a_file_that_stays_away_is_missing(files: tuple[Path, Path], tmp_path: Path) -> None:

@@ -38,21 +38,6 @@ def test_the_mandelbulb_is_whites_trigonometric_rule(power: float, phases: tuple
     np.testing.assert_allclose(got, expected.T, atol=4e-14 * float((r**power).max()))
 
 
-def test_whole_mandelbulb_powers_need_no_trigonometry() -> None:
-    from clfractal.formulas.language import Call, walk
-
-    formula = catalog.load("mandelbulb")
-    called = {
-        part.function
-        for node in (*(n for _, n in formula.let), *formula.map)
-        for part in walk(node)
-        if isinstance(part, Call)
-        and part.arguments
-        and part.arguments[0] not in [p for p in part.arguments if getattr(p, "name", "").endswith("phase")]
-    }
-    assert called.isdisjoint({"sin", "cos", "tan", "atan2", "acos", "exp", "log"})
-
-
 @pytest.mark.parametrize(("power", "times"), [(4, 2), (8, 3)])
 def test_squaring_again_is_the_higher_power_of_hast(power: int, times: int) -> None:
     # Englund 2010, Eq. 12: Z^8 is ((Z^2)^2)^2.

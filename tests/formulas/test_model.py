@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from functools import lru_cache, partial
 from itertools import product
 from typing import Any
@@ -54,6 +55,15 @@ def formula(**changes: Any) -> Any:
 
 def bound(parameters: dict[str, Any] | None = None, **more: Any) -> BoundFormula:
     return bind(formula(), parameters, where=Where(path="formula"), **more)
+
+
+def refused(call: Callable[[], object], path: str, words: str) -> None:
+    """With one line that says where."""
+    with pytest.raises(FormulaError) as caught:
+        call()
+    assert words in caught.value.message
+    assert caught.value.where.path == path
+    assert "\n" not in str(caught.value)
 
 
 def test_numbers_follow_from_parameters() -> None:
@@ -123,11 +133,7 @@ def test_the_distance_bailout_leaves_room_for_float32() -> None:
     ],
 )
 def test_a_wrong_formula_is_one_located_error(changes: dict[str, Any], path: str, words: str) -> None:
-    with pytest.raises(FormulaError) as caught:
-        formula(**changes)
-    assert words in caught.value.message
-    assert caught.value.where.path == path
-    assert "\n" not in str(caught.value)
+    refused(lambda: formula(**changes), path, words)
 
 
 @pytest.mark.parametrize("data", [None, 3, "x", [], ["variables"]])
@@ -152,10 +158,7 @@ def test_a_formula_is_a_mapping(data: object) -> None:
     ],
 )
 def test_a_wrong_parameter_is_one_located_error(parameters: dict[str, Any], path: str, words: str) -> None:
-    with pytest.raises(FormulaError) as caught:
-        bound(parameters)
-    assert words in caught.value.message
-    assert caught.value.where.path == path
+    refused(lambda: bound(parameters), path, words)
 
 
 @pytest.mark.parametrize(
@@ -263,10 +266,7 @@ def test_chains() -> None:
     ],
 )
 def test_a_wrong_section_is_one_located_error(spec: dict[str, Any], path: str, words: str) -> None:
-    with pytest.raises(FormulaError) as caught:
-        catalog.resolve(spec, None, Where(path="formula"))
-    assert words in caught.value.message
-    assert caught.value.where.path == path
+    refused(lambda: catalog.resolve(spec, None, Where(path="formula")), path, words)
 
 
 # --- one program for all values of parameters ---

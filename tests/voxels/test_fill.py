@@ -12,6 +12,7 @@ from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
+from tests.calls import raising
 from tests.devices import device
 from tests.voxels.grids import ROUNDED, differing_voxels, filled, inside, volume_scene, voxel_points
 
@@ -193,8 +194,5 @@ def test_progress_and_an_interrupt_in_it() -> None:
     assert {stage for stage, _, _ in seen} == {"octree", "fill", "store"}
     assert all(0 <= done <= total for _, done, total in seen)
 
-    def stop(stage: str, done: int, total: int) -> None:
-        raise KeyboardInterrupt
-
     with pytest.raises(KeyboardInterrupt):
-        filled(scene, progress=stop)
+        filled(scene, progress=raising(KeyboardInterrupt))

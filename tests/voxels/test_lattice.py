@@ -35,6 +35,7 @@ from clfractal.voxels.lattice import (
     unpack_places,
 )
 from clfractal.voxels.octree import EMPTY, FULL, UNDECIDED, descend, empty_cubes
+from tests.calls import counted
 from tests.device.struct_layout import verify
 from tests.devices import device
 from tests.voxels.grids import filled, place_of, volume_scene
@@ -212,19 +213,12 @@ def test_a_grid_is_read_in_pieces(made: Callable[[], Grid], monkeypatch: pytest.
     """Never as a whole: its pool is as large as the array that is made of it."""
     whole = made()
     values, normals = whole.dense(), whole.dense_normals()
-    read: list[int] = []
-    copy = cl.enqueue_copy
-
-    def counted(queue: cl.CommandQueue, target: Any, source: Any, **settings: Any) -> Any:
-        read.append(target.nbytes)
-        return copy(queue, target, source, **settings)
-
     monkeypatch.setattr(grid, "_PIECE", 10_000)
-    monkeypatch.setattr(cl, "enqueue_copy", counted)
+    copies = counted(monkeypatch, cl, "enqueue_copy")
     np.testing.assert_array_equal(whole.dense(), values)
     np.testing.assert_array_equal(whole.dense_normals(), normals)
-    assert len(read) > 10
-    assert max(read) <= 10_000
+    assert len(copies) > 10
+    assert max(target.nbytes for _, target, *_ in copies) <= 10_000
 
 
 # --- grids of others ---
