@@ -17,11 +17,10 @@ import numpy as np
 import numpy.typing as npt
 from PIL import Image
 
-from clfractal.api import load_scene, render, render_pair
+import clfractal
 from clfractal.files import resources
 from clfractal.images.compose import APART, Composed
-from clfractal.images.framebuffer import Framebuffer, in_memory
-from clfractal.scene.model import Scene
+from clfractal.images.framebuffer import in_memory
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.volume import VolumeRenderer
 
@@ -39,12 +38,12 @@ def scene_paths() -> list[Path]:
     return sorted(resources.folder("scenes").glob("*.yaml"))
 
 
-def small_scene(path: Path) -> Scene:
+def small_scene(path: Path) -> clfractal.Scene:
     """The scene at the size of the golden pictures, which is their reference too, with few samples and small grids.
 
     One sample alone is noise, and along paths SAMPLES are.
     """
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     renderers: dict[str, Renderer] = {"renderer": scene.renderer}
     for number, view in enumerate(scene.layout.views if scene.layout else ()):
         if view.renderer is not None:
@@ -54,20 +53,20 @@ def small_scene(path: Path) -> Scene:
         sizes.append(f"{key}.samples={PATHS if scene.lighting.mode == 'path' else SAMPLES}")
         if isinstance(renderer, VolumeRenderer):
             sizes.append(f"{key}.resolution={RESOLUTION}")
-    return load_scene(path, overrides=sizes)
+    return clfractal.load_scene(path, overrides=sizes)
 
 
 @cache
-def small_framebuffers(path: Path) -> tuple[Framebuffer, ...]:
+def small_framebuffers(path: Path) -> tuple[clfractal.Framebuffer, ...]:
     """The scene rendered small, for each eye; once for all tests, because building its program takes seconds."""
     scene = small_scene(path)
     channels = ["R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z", "iterations"]
     if scene.stereo is not None:
-        return render_pair(scene, channels=channels)
-    return (render(scene, channels=channels),)
+        return clfractal.render_pair(scene, channels=channels)
+    return (clfractal.render(scene, channels=channels),)
 
 
-def small_framebuffer(path: Path) -> Framebuffer:
+def small_framebuffer(path: Path) -> clfractal.Framebuffer:
     """The scene rendered small; of a stereo scene what the left eye sees."""
     return small_framebuffers(path)[0]
 

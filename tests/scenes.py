@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
+import clfractal
 
 # Squaring the quaternion x + iy + jz squares its length, so after n applications |z| <= 4 is the ball of radius
 # 4^(2^-n) exactly.
@@ -59,6 +58,8 @@ def scene_of(
     folder: Path | None = None,
     overrides: Sequence[str] = (),
     **sections: Any,
-) -> Scene:
+) -> clfractal.Scene:
     """The scene of such sections, with values replaced as by `--set`; the files that it names lie in `folder`."""
-    return load_scene(sections_of(formula, camera, size, **sections), folder=folder, overrides=overrides)
+    return clfractal.load_scene(
+        sections_of(formula, camera, size, **sections), folder=folder, overrides=overrides
+    )

@@ -16,7 +16,6 @@ import pytest
 import clfractal
 from clfractal.device.select import choose
 from clfractal.engine import run as work
-from clfractal.errors import SceneError
 from clfractal.files.exr import read_exr
 from clfractal.files.frame_names import frame_file
 from tests.halves import halves_of
@@ -239,13 +238,13 @@ def test_a_track_of_what_an_override_removes_is_refused_at_its_line(
 
 
 def test_arguments_of_python_are_checked() -> None:
-    with pytest.raises(SceneError, match="numbers: must be from 0 to 4, got 5"):
+    with pytest.raises(clfractal.SceneError, match="numbers: must be from 0 to 4, got 5"):
         clfractal.frames(SCENE, numbers=[5])
-    with pytest.raises(SceneError, match="numbers: must be a list of numbers of frames"):
+    with pytest.raises(clfractal.SceneError, match="numbers: must be a list of numbers of frames"):
         clfractal.frames(SCENE, numbers=3)  # type: ignore[arg-type]
-    with pytest.raises(SceneError, match="frame: must be at most 4, got 6"):
+    with pytest.raises(clfractal.SceneError, match="frame: must be at most 4, got 6"):
         clfractal.at_frame(SCENE, 6)
-    with pytest.raises(SceneError, match="animation: is missing"):
+    with pytest.raises(clfractal.SceneError, match="animation: is missing"):
         clfractal.frames({"version": 1, "formula": {"name": "hast"}, "camera": {}})
 
 

@@ -14,9 +14,7 @@ from PIL import Image
 
 import clfractal
 from clfractal.device.select import Device
-from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
-from clfractal.images.framebuffer import Framebuffer
 from tests.render.shots import engine_of
 from tests.shell import SCENE, python, works
 
@@ -133,7 +131,7 @@ def test_a_region_is_a_part_of_the_whole(tmp_path: Path) -> None:
 def test_progress_can_end_a_render() -> None:
     seen: list[int] = []
 
-    def stop(state: Progress) -> None:
+    def stop(state: clfractal.Progress) -> None:
         seen.append(state.tiles_done)
         raise TimeoutError
 
@@ -230,7 +228,7 @@ def test_an_engine_says_how_long_previews_were_built(device: Device) -> None:
 
 
 def test_a_film_has_makers() -> None:
-    framebuffer = Framebuffer(("R",), (8, 8))
+    framebuffer = clfractal.Framebuffer(("R",), (8, 8))
     with pytest.warns(DeprecationWarning, match="Framebuffer.makers is Framebuffer.provenance"):
         assert framebuffer.makers is framebuffer.provenance
 

@@ -12,7 +12,6 @@ import pytest
 
 import clfractal
 from clfractal import camera
-from clfractal.images.framebuffer import Framebuffer
 from tests.shell import SCENE
 
 POINTS = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]]
@@ -87,7 +86,7 @@ def test_wrong_arguments_of_an_engine() -> None:
 def test_a_film_is_saved_as_asked_or_not_at_all(
     settings: dict[str, Any], message: str, tmp_path: Path
 ) -> None:
-    framebuffer = Framebuffer(("R", "G", "B", "A"), (4, 4))
+    framebuffer = clfractal.Framebuffer(("R", "G", "B", "A"), (4, 4))
     refused(lambda: framebuffer.save(tmp_path / "a.png", **settings), message)
     assert list(tmp_path.iterdir()) == []
     refused(lambda: framebuffer.save(3), "path: must be a path, got 3")  # type: ignore[arg-type]

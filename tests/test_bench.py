@@ -9,6 +9,7 @@ from unittest.mock import MagicMock
 
 import pytest
 
+import clfractal
 from benchmarks import compare, growth
 from benchmarks.ours import Ours
 from benchmarks.rivals import base
@@ -19,17 +20,13 @@ from benchmarks.runtimes import Runtime
 from clfractal.cli import bench
 from clfractal.cli.shell import Shell
 from clfractal.device.select import choose
-from clfractal.engine.engine import Engine
-from clfractal.errors import ClfractalError
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 
 
-def scene_of(row: str, *changes: str) -> Scene:
+def scene_of(row: str, *changes: str) -> clfractal.Scene:
     text, own, _ = bench.ROWS[row]
-    return load_scene(text, overrides=(*own, *changes))
+    return clfractal.load_scene(text, overrides=(*own, *changes))
 
 
 def test_rows_are_one_scene_each_but_for_what_they_measure() -> None:
@@ -147,7 +144,9 @@ def test_only_the_wanted_rows_are_measured(tmp_path: Path, monkeypatch: pytest.M
         bench.run(device=None, json_file=report, shell=shell, wanted=wanted)
         found = [one["name"] for one in json.loads(report.read_text())["rows"]]
         assert found == [name for name in bench.row_names() if name in wanted or not wanted]
-    with pytest.raises(ClfractalError, match="--row: unknown row 'hast3'; known: mandelbulb8-shadow"):
+    with pytest.raises(
+        clfractal.ClfractalError, match="--row: unknown row 'hast3'; known: mandelbulb8-shadow"
+    ):
         bench.run(device=None, json_file=None, shell=shell, wanted=("hast3",))
 
 
@@ -192,7 +191,7 @@ def test_the_table_of_growth(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(growth, "RESOLUTIONS", (24, 1024))
     monkeypatch.setattr(growth, "SHOWN", (24, 1024))
     monkeypatch.setattr(growth, "MEGAPIXELS", (0.01, 16))
-    lines = list(growth.figures(Engine(), 1, 24, 1))
+    lines = list(growth.figures(clfractal.Engine(), 1, 24, 1))
     assert [(line.row, line.size) for line in lines] == [
         ("grid", "24^3"),
         ("volume, composited", "24^3, 0.01 MP"),

@@ -20,7 +20,6 @@ from clfractal.cli import progress
 from clfractal.cli.program import app
 from clfractal.cli.progress import Reporter
 from clfractal.cli.shell import Shell
-from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import catalog
@@ -190,7 +189,7 @@ def test_plain_lines_come_at_most_every_two_seconds(
     now = [100.0]
     monkeypatch.setattr(time, "monotonic", lambda: now[0])
     reporter = Reporter(Shell(owns_process=False), 1000)
-    state = Progress(1000)
+    state = clfractal.Progress(1000)
     for tick in range(1000):
         now[0] += 0.01  # ten seconds in all
         state.tiles_done, state.rays = tick, 1000 * tick

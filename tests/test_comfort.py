@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+import clfractal
 from clfractal.camera.views import scene_view, seen_by
 from clfractal.device.select import Device, choose
 from clfractal.engine import comfort
@@ -17,8 +18,6 @@ from clfractal.engine.comfort import Comfort, comfort_of, comfort_of_depth, fitt
 from clfractal.engine.job import Job
 from clfractal.engine.preview import Preview, points_of_depth
 from clfractal.engine.run import run
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.stereo import EyeName, Stereo
 from clfractal.stereo.eyes import degrees, eye_distance
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of, points_of, shoot
@@ -50,12 +49,12 @@ def preview(device: Device) -> Preview:
     return engine_of(device).preview
 
 
-def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> Scene:
+def seen(kind: str, size: tuple[int, int] = SIZE, **stereo: Any) -> clfractal.Scene:
     """A stereo scene of one of the solids."""
     sections = {"camera": CAMERA, **SOLIDS_SEEN[kind], "stereo": {**VIEWER, **stereo}}
     if kind == "mandelbulb":
-        plain = load_scene(SCENE).resolved()
-        return load_scene({**plain, **sections, "image": {"width": size[0], "height": size[1]}})
+        plain = clfractal.load_scene(SCENE).resolved()
+        return clfractal.load_scene({**plain, **sections, "image": {"width": size[0], "height": size[1]}})
     camera = sections.pop("camera")
     return scene_of(SOLIDS if kind == "solids" else BALL, camera, size, **sections)
 

@@ -11,11 +11,10 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clfractal.api import load_scene
+import clfractal
 from clfractal.images.anaglyph import IDEAL, Filter, Floats, Glasses, Method, matrices, mix
 from clfractal.images.modes import eye_size, picture_size
 from clfractal.images.outputs import output_files
-from clfractal.scene.model import Scene
 from clfractal.scene.stereo import Mode, Stereo
 from clfractal.stereo.eyes import degrees
 from tests.document import DOCS, code, table, text
@@ -131,8 +130,8 @@ def test_drawings_are_there_and_as_they_are_made(tmp_path: Path, monkeypatch: py
             assert np.abs(difference).mean() < 2
 
 
-def stereo_scenes() -> list[Scene]:
-    return [load_scene(path) for path in sorted((DOCS.parent / "scenes").glob("stereo_*.yaml"))]
+def stereo_scenes() -> list[clfractal.Scene]:
+    return [clfractal.load_scene(path) for path in sorted((DOCS.parent / "scenes").glob("stereo_*.yaml"))]
 
 
 def test_there_are_stereo_scenes_of_three_formulas_and_a_volume() -> None:

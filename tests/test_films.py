@@ -14,7 +14,6 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.errors import ClfractalError, FileError
 from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, Recipe
 from clfractal.files.moving import plan_film, write_film, ycbcr
 from clfractal.files.png import read_form, write_png
@@ -237,7 +236,7 @@ REFUSED: dict[tuple[str, Recipe, tuple[int, int]], str] = {
 @pytest.mark.parametrize("asked", REFUSED, ids=str)
 def test_what_a_film_cannot_be(asked: tuple[str, Recipe, tuple[int, int]], tmp_path: Path) -> None:
     name, recipe, size = asked
-    with pytest.raises(ClfractalError) as caught:
+    with pytest.raises(clfractal.ClfractalError) as caught:
         plan_film(tmp_path / name, recipe, size, 25)
     assert REFUSED[asked] in caught.value.message
 
@@ -279,13 +278,15 @@ def test_frames_of_another_part_stay(clf: InProcess) -> None:
 
 @pytest.mark.parametrize("mode", ["pair", "multi_view"])
 def test_two_pictures_are_no_film(mode: str, tmp_path: Path) -> None:
-    with pytest.raises(ClfractalError, match=r"choose another stereo\.mode, such as split"):
+    with pytest.raises(clfractal.ClfractalError, match=r"choose another stereo\.mode, such as split"):
         plan_film(tmp_path / "a.mp4", Recipe(), SIZE, 25, stereo=mode)
 
 
 def test_without_the_package_it_says_what_to_install(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "av", None)
-    with pytest.raises(ClfractalError, match=r"needs the package av: pip install 'clfractal\[film\]'"):
+    with pytest.raises(
+        clfractal.ClfractalError, match=r"needs the package av: pip install 'clfractal\[film\]'"
+    ):
         plan_film(tmp_path / "a.mp4", Recipe(), SIZE, 25)
 
 
@@ -303,10 +304,10 @@ def test_a_picture_that_cannot_be_read_makes_no_film(pictures: list[Path], tmp_p
     pictures[2].write_bytes(b"nothing")
     path = tmp_path / "film.mp4"
     path.write_bytes(b"before")
-    with pytest.raises(ClfractalError, match=r"2\.png: cannot be read"):
+    with pytest.raises(clfractal.ClfractalError, match=r"2\.png: cannot be read"):
         write_film(plan_film(path, Recipe(), SIZE, 25), pictures)
     Image.new("RGB", (64, 48)).save(pictures[2])
-    with pytest.raises(ClfractalError, match="is 64 x 48 pixels, and not as the film"):
+    with pytest.raises(clfractal.ClfractalError, match="is 64 x 48 pixels, and not as the film"):
         write_film(plan_film(path, Recipe(), SIZE, 25), pictures)
     assert path.read_bytes() == b"before"
     assert sorted(each.name for each in tmp_path.iterdir()) == [*(f"{i}.png" for i in range(6)), "film.mp4"]
@@ -375,5 +376,5 @@ def test_the_form_of_a_picture(tmp_path: Path) -> None:
         Image.new(mode, (3, 2)).save(tmp_path / "a.png")
         assert read_form(tmp_path / "a.png") == form
     (tmp_path / "b.png").write_bytes(b"\x89PNG\r\n\x1a\n")
-    with pytest.raises(FileError, match="is not a PNG file"):
+    with pytest.raises(clfractal.FileError, match="is not a PNG file"):
         read_form(tmp_path / "b.png")

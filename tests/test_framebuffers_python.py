@@ -13,18 +13,17 @@ import pytest
 from PIL import Image
 
 import clfractal
-from clfractal.images.framebuffer import Framebuffer
 from tests.shell import SCENE, InProcess, works
 
 PAIR = SCENE + "stereo: {screen_width: 0.6, screen_distance: 0.7}\n"
 
 
 @pytest.fixture(scope="module")
-def framebuffer() -> Framebuffer:
+def framebuffer() -> clfractal.Framebuffer:
     return clfractal.render(SCENE)
 
 
-def test_an_array_of_a_film_has_its_colours_side_by_side(framebuffer: Framebuffer) -> None:
+def test_an_array_of_a_film_has_its_colours_side_by_side(framebuffer: clfractal.Framebuffer) -> None:
     colors = np.asarray(framebuffer)
     assert colors.shape == (36, 40, 3)
     assert colors.dtype == np.float32
@@ -36,15 +35,15 @@ def test_an_array_of_a_film_has_its_colours_side_by_side(framebuffer: Framebuffe
     with pytest.raises(ValueError, match="without copying"):
         np.array(framebuffer, copy=False)
     with pytest.raises(KeyError, match="unknown channel"):
-        np.asarray(Framebuffer(["Z"], (2, 2)))
+        np.asarray(clfractal.Framebuffer(["Z"], (2, 2)))
 
 
-def test_an_image_has_the_pixels_of_a_png(framebuffer: Framebuffer) -> None:
+def test_an_image_has_the_pixels_of_a_png(framebuffer: clfractal.Framebuffer) -> None:
     image = framebuffer.to_image()
     assert (image.mode, image.size) == ("RGB", (40, 36))
     np.testing.assert_array_equal(np.asarray(image), framebuffer.to_rgb8())
     with pytest.raises(KeyError, match="unknown channel"):
-        Framebuffer(["Z"], (2, 2)).to_image()
+        clfractal.Framebuffer(["Z"], (2, 2)).to_image()
 
 
 def test_an_image_is_as_bright_and_as_transparent_as_the_scene_says(tmp_path: Path) -> None:
@@ -74,7 +73,7 @@ def test_a_data_set_names_every_channel(tmp_path: Path) -> None:
     assert all(isinstance(value, (str, int, float)) for value in found.attrs.values())
 
 
-def test_a_data_set_needs_xarray(framebuffer: Framebuffer, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_data_set_needs_xarray(framebuffer: clfractal.Framebuffer, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "xarray", None)
     with pytest.raises(clfractal.FileError, match="pip install xarray"):
         framebuffer.to_xarray()
@@ -102,12 +101,12 @@ def test_a_film_has_the_statistics_that_the_shell_writes(
     json.dumps(left.stats)
 
 
-def test_the_counts_of_a_film_are_its_rays(framebuffer: Framebuffer) -> None:
+def test_the_counts_of_a_film_are_its_rays(framebuffer: clfractal.Framebuffer) -> None:
     assert framebuffer.stats["rays"] == 36 * 40
     assert (framebuffer.stats["width"], framebuffer.stats["height"]) == (40, 36)
     assert framebuffer.stats["samples"] == 1
     assert framebuffer.stats["steps_per_ray"] > 1
-    assert Framebuffer().stats == {}
+    assert clfractal.Framebuffer().stats == {}
 
 
 def test_a_refinement_counts_all_its_passes() -> None:
@@ -126,7 +125,7 @@ def test_parallax_is_unknown_without_depth() -> None:
     assert pair.stats["stereo"]["mode"] == "anaglyph"
 
 
-def test_a_film_goes_to_another_process_and_back(framebuffer: Framebuffer, tmp_path: Path) -> None:
+def test_a_film_goes_to_another_process_and_back(framebuffer: clfractal.Framebuffer, tmp_path: Path) -> None:
     size = sum(framebuffer[name].nbytes for name in framebuffer)
     written = pickle.dumps(framebuffer)
     assert len(written) < 1.2 * size + 20_000  # each channel once

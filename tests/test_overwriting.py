@@ -13,12 +13,10 @@ import pytest
 
 import clfractal
 from clfractal.cli.program import app
-from clfractal.errors import FileError
 from clfractal.files import resources
 from clfractal.files.exr import write_exr
 from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.images.framebuffer import Framebuffer
 from clfractal.scene.load import load_scene, read_scene
 from tests.shell import SCENE, InProcess
 
@@ -171,7 +169,7 @@ def test_names_that_a_file_system_may_not_tell_apart(here: Path, monkeypatch: py
         monkeypatch.setattr("clfractal.files.inputs._differ", lambda *_: True)
         refuse_overwriting([one, two])
         monkeypatch.setattr("clfractal.files.inputs._differ", lambda *_: False)
-        with pytest.raises(FileError, match=TWICE):
+        with pytest.raises(clfractal.FileError, match=TWICE):
             refuse_overwriting([one, two])
 
 
@@ -212,14 +210,14 @@ def test_films(here: Path) -> None:
     before = contents(here)
     film = clfractal.render(Path("sky.yaml"))
     for name in ("sky.exr", "deep/sky.exr", "hard.exr"):
-        with pytest.raises(FileError, match=f"^{name}: {READ}"):
+        with pytest.raises(clfractal.FileError, match=f"^{name}: {READ}"):
             film.save(name)
     left, right = clfractal.render_pair(Path("out_R.png"))
     for eye in (left, right):
-        with pytest.raises(FileError, match=f"^out_R.png: {READ}"):
+        with pytest.raises(clfractal.FileError, match=f"^out_R.png: {READ}"):
             eye.save("out_R.png")
     assert contents(here) == before
     film.save("new.png")
     film.save("new.png")
-    assert isinstance(film, Framebuffer)
+    assert isinstance(film, clfractal.Framebuffer)
     assert len(contents(here)) == len(before) + 1

@@ -24,7 +24,6 @@ from clfractal.device.select import choose
 from clfractal.engine.prepare import prepare
 from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
-from clfractal.scene.load import load_scene
 from tests.interrupts import planes
 from tests.long_renders import HEAVY, TILES
 from tests.shell import SCENE, Ended, Running, command, environment, has_bytes, process, python, works
@@ -140,7 +139,7 @@ def test_work_goes_on_with_the_lanes_that_it_began_with(tmp_path: Path) -> None:
     began, other = 1, 4
     whole, resumed = tmp_path / "whole", tmp_path / "resumed"
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    job = prepare(load_scene(tmp_path / "heavy.yaml"), choose())
+    job = prepare(clfractal.load_scene(tmp_path / "heavy.yaml"), choose())
     view = replace(job.views[0], plan=replace(job.views[0].plan, lanes=began))
     begun = replace(job, views=(view,))
     shell = Shell(owns_process=False)

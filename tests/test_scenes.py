@@ -22,12 +22,10 @@ import numpy.typing as npt
 import pytest
 
 import clfractal
-from clfractal.api import load_scene
 from clfractal.formulas import catalog, reference
 from clfractal.scene.animation import Animation
 from clfractal.scene.checks import inside_solid
 from clfractal.scene.cut_plane import CutPlaneRenderer
-from clfractal.scene.model import Scene
 from clfractal.scene.movement import movement_of
 from clfractal.scene.volume import VolumeRenderer
 from tests.makers import maker, pictured
@@ -124,7 +122,7 @@ def test_there_are_scenes_for_the_whole_library() -> None:
     assert len(SCENES) >= 14
     used = set()
     for path in SCENES:
-        formula = load_scene(path).formula
+        formula = clfractal.load_scene(path).formula
         used |= {formula.name} | {link.name for link in formula.chain or ()}
     assert set(catalog.names()) - used == set()
 
@@ -145,7 +143,7 @@ def test_it_begins_with_what_it_shows(path: Path) -> None:
 
 @each_scene
 def test_it_is_as_large_as_a_screen_or_a_print_and_smooth(path: Path) -> None:
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     size = (scene.image.width, scene.image.height)
     # Views beside each other make a wider picture.
     assert size in ((1920, 1080), (2048, 2048), *([(2160, 1080)] if scene.layout else []))
@@ -164,7 +162,7 @@ def test_it_shows_something_well_lit(path: Path) -> None:
     for channel in "RGB":
         assert np.isfinite(film[channel]).all()
         assert film[channel].min() >= 0
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     # Of a cut plane, which fills the picture, it is the outside that has colours, and it may be all of it.
     is_plane = isinstance(scene.renderer, CutPlaneRenderer)
     hit = film["iterations"] < scene.formula.iterations if is_plane else film["A"] > 0
@@ -223,7 +221,7 @@ def test_the_comparison_finds_what_matters() -> None:
 # --- films, which move evenly ---
 
 
-FILMS = [path for path in scene_paths() if load_scene(path).animation is not None]
+FILMS = [path for path in scene_paths() if clfractal.load_scene(path).animation is not None]
 each_film = pytest.mark.parametrize("path", FILMS, ids=lambda path: path.stem, scope="module")
 
 # The change of a step from one frame to the next, as a part of the largest step. A value that goes there and back as a
@@ -238,12 +236,12 @@ SMALL = (64, 36)
 Floats = npt.NDArray[np.float64]
 
 
-def animation_of(scene: Scene) -> Animation:
+def animation_of(scene: clfractal.Scene) -> Animation:
     assert scene.animation is not None
     return scene.animation
 
 
-def ways(scene: Scene, frames: npt.ArrayLike) -> Mapping[str, Floats]:
+def ways(scene: clfractal.Scene, frames: npt.ArrayLike) -> Mapping[str, Floats]:
     """For each track its values at these frames, (frames, numbers); those that go by factors as logarithms."""
     found = {}
     for mover in movement_of(scene).movers:
@@ -260,7 +258,7 @@ def steps_of(values: Floats) -> Floats:
 
 @each_film
 def test_it_lasts_some_seconds(path: Path) -> None:
-    film = animation_of(load_scene(path))
+    film = animation_of(clfractal.load_scene(path))
     assert 24 <= film.fps <= 30
     assert 3 <= film.count / film.fps <= 8
 
@@ -268,7 +266,7 @@ def test_it_lasts_some_seconds(path: Path) -> None:
 @each_film
 def test_nothing_jumps(path: Path) -> None:
     """Nor at the seam of a film that begins again: there the frames go on beyond its end."""
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     film = animation_of(scene)
     frames = np.arange(film.count + 2 if film.loop else film.count)
     for name, values in ways(scene, frames).items():
@@ -281,7 +279,7 @@ def test_nothing_jumps(path: Path) -> None:
 
 @each_film
 def test_the_camera_goes_by_small_parts_of_what_it_sees(path: Path) -> None:
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     film = animation_of(scene)
     cameras = [clfractal.at_frame(scene, frame).camera for frame in range(film.count)]
     places, targets = (np.array([getattr(each, key) for each in cameras]) for key in ("position", "target"))
@@ -295,7 +293,7 @@ def test_the_camera_goes_by_small_parts_of_what_it_sees(path: Path) -> None:
 @each_film
 def test_the_camera_is_never_inside(path: Path) -> None:
     """Not between two frames either."""
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     film = animation_of(scene)
     for frame in np.arange(0, film.count - 0.5, 1.5):
         still = clfractal.at_frame(scene, float(frame))
@@ -313,18 +311,18 @@ def test_the_camera_is_never_inside(path: Path) -> None:
         assert clearance > CLEARANCE * np.linalg.norm(place - still.camera.target), frame
 
 
-def stays(scene: Scene, points: Floats) -> npt.NDArray[np.bool_]:
+def stays(scene: clfractal.Scene, points: Floats) -> npt.NDArray[np.bool_]:
     """Which points the bailout lets be a part of the set."""
     return reference.escape(scene.chain, points, scene.formula.iterations)[1]
 
 
-LOOPS = [path for path in FILMS if animation_of(load_scene(path)).loop]
+LOOPS = [path for path in FILMS if animation_of(clfractal.load_scene(path)).loop]
 
 
 @pytest.mark.parametrize("path", LOOPS, ids=lambda path: path.stem)
 def test_the_last_frame_leads_into_the_first(path: Path) -> None:
     """What does not come back to its first value has gone on by a period of space, and all of it by the same."""
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     count = animation_of(scene).count
     shifts = []
     for name, values in ways(scene, [0, 1, count, count + 1]).items():
@@ -351,12 +349,12 @@ def test_the_last_frame_leads_into_the_first(path: Path) -> None:
 def test_its_frames_show_something(path: Path) -> None:
     """At its beginning, on its way and at its end, not only where the still of the scene is."""
     small = [f"image.width={SMALL[0]}", f"image.height={SMALL[1]}"]
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     if isinstance(scene.renderer, VolumeRenderer):
         small.append("renderer.resolution=64")
     count = animation_of(scene).count
     numbers = [0, count // 3, 2 * count // 3, count - 1]
-    found = clfractal.frames(load_scene(path, overrides=small), numbers=numbers, samples=1)
+    found = clfractal.frames(clfractal.load_scene(path, overrides=small), numbers=numbers, samples=1)
     for number, film in found:
         seen = film["A"] > 0
         assert seen.mean() > 0.06, number
@@ -371,7 +369,7 @@ def test_its_small_film_is_shown(path: Path) -> None:
     from PIL import Image
 
     films = maker("make_films")
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     film, file = animation_of(scene), films.film_of(path.stem)
     page = (films.DOCS / "films.md").read_text("utf-8")
     assert f"](pictures/{file.name})" in page

@@ -16,13 +16,10 @@ from clfractal.cli import show_scenes as scenes_command
 from clfractal.cli import watch
 from clfractal.cli.new import scene_text
 from clfractal.engine import thumbnails
-from clfractal.engine.engine import Engine
 from clfractal.engine.framing import Framing
 from clfractal.engine.quality import PRESETS, with_quality
-from clfractal.errors import SceneError
 from clfractal.files.png import read_png_pixels
 from clfractal.files.watching import Watched
-from clfractal.scene.load import load_scene
 from tests.shell import SCENE, InProcess, works
 
 REFUSED = {
@@ -80,17 +77,17 @@ def test_a_sheet_goes_on_where_it_was_interrupted(
     kept: dict[str, thumbnails.Pixels] = {}
     monkeypatch.setattr(thumbnails, "load", kept.get)
     monkeypatch.setattr(thumbnails, "store", kept.__setitem__)
-    render = Engine.render
+    render = clfractal.Engine.render
     rendered: list[int] = []
 
-    def interrupted(engine: Engine, *arguments: object, **settings: object) -> object:
+    def interrupted(engine: clfractal.Engine, *arguments: object, **settings: object) -> object:
         if len(rendered) == 2:
             rendered.clear()
             raise KeyboardInterrupt
         rendered.append(1)
         return render(engine, *arguments, **settings)  # type: ignore[arg-type]
 
-    monkeypatch.setattr(Engine, "render", interrupted)
+    monkeypatch.setattr(clfractal.Engine, "render", interrupted)
     with pytest.raises(KeyboardInterrupt):
         clf("scenes", "--sheet", "sheet.png")
     assert not Path("sheet.png").exists()
@@ -118,7 +115,7 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
     assert ended.out == ""
     text = Path("first.yaml").read_text("utf-8")
     assert text.startswith("# First\n")
-    scene = load_scene(Path("first.yaml"))
+    scene = clfractal.load_scene(Path("first.yaml"))
     assert scene.formula.name == "mandelbulb"
     small = scene.model_copy(update={"image": {"width": 64, "height": 36}})
     covered = clfractal.render(small, samples=1, channels=["A"])["A"] > 0
@@ -137,7 +134,7 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
 def test_a_set_that_fills_its_bounds_is_seen_from_within(clf: InProcess, formula: str) -> None:
     """Elsewhere one sees but the ball in which it was cut off."""
     works(clf("new", "hall", "--formula", formula))
-    scene = load_scene(Path("hall.yaml"))
+    scene = clfractal.load_scene(Path("hall.yaml"))
     center, radius = scene.bounds
     assert np.linalg.norm(np.subtract(scene.camera.position, center)) < 0.7 * radius
     assert scene.fog is not None
@@ -242,7 +239,7 @@ def test_a_change_ends_a_render(tmp_path: Path) -> None:
 
 
 def test_presets_set_samples_and_noise_and_nothing_else() -> None:
-    scene = load_scene(
+    scene = clfractal.load_scene(
         SCENE + "renderer: {samples: 5, noise: 0.1, min_samples: 4, detail: 3, max_steps: 70}\n"
     )
     for name, preset in PRESETS.items():
@@ -252,12 +249,14 @@ def test_presets_set_samples_and_noise_and_nothing_else() -> None:
         assert renderer.min_samples is None
         assert (renderer.max_steps, renderer.detail) == (70, 3)
         assert found.model_copy(update={"renderer": scene.renderer}) == scene
-    with pytest.raises(SceneError, match=r"^quality: unknown quality 'god'; did you mean 'good'\?$"):
+    with pytest.raises(
+        clfractal.SceneError, match=r"^quality: unknown quality 'god'; did you mean 'good'\?$"
+    ):
         with_quality(scene, "god")
 
 
 def test_presets_of_other_renderers_and_of_views() -> None:
-    plane = load_scene(
+    plane = clfractal.load_scene(
         SCENE + "renderer: {type: cut_plane}\nlayout: {views: [{renderer: {samples: 9}}, {}]}\n"
     )
     found = with_quality(plane, "good")
@@ -289,9 +288,9 @@ def test_explicit_options_win(clf: InProcess) -> None:
             "2",
         )
     )
-    renderer = load_scene(Path("out.png")).surface
+    renderer = clfractal.load_scene(Path("out.png")).surface
     assert (renderer.samples, renderer.noise) == (2, 0.3)
     film = clfractal.render(SCENE, samples=2, quality="good", channels=["R", "G", "B"])
-    assert load_scene(str(film.header["scene"])).surface.noise == 0.02
-    with pytest.raises(SceneError, match=r"^quality: unknown quality 'best'"):
+    assert clfractal.load_scene(str(film.header["scene"])).surface.noise == 0.02
+    with pytest.raises(clfractal.SceneError, match=r"^quality: unknown quality 'best'"):
         clfractal.render(SCENE, quality="best")

@@ -12,7 +12,6 @@ import pytest
 import clfractal
 from clfractal.device import program
 from clfractal.device.select import choose
-from clfractal.engine.run import Progress
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.integrators.surface import PROGRAMS
@@ -51,7 +50,7 @@ def builds(monkeypatch: pytest.MonkeyPatch) -> list[str]:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_of_python(kind: str, builds: list[str]) -> None:
-    seen: list[Progress] = []
+    seen: list[clfractal.Progress] = []
     start = time.perf_counter()
     film = clfractal.render(SCENE + KINDS[kind], progress=seen.append)
     assert time.perf_counter() - start > COMPILING

@@ -11,7 +11,6 @@ import clfractal
 from clfractal.cli.slices import Stack, slice_scene
 from clfractal.files.exr import read_exr
 from clfractal.integrators.cut_plane import renderer_of
-from clfractal.scene.load import load_scene
 from tests.interrupts import interrupted_at
 from tests.shell import InProcess, works
 
@@ -50,7 +49,7 @@ def test_slices_follow_each_other_along_the_normal(clf: InProcess) -> None:
 def test_by_default_they_reach_through_the_set(clf: InProcess) -> None:
     assert clf("slices", "scene.yaml", "--count", "2", "--start", "2", "--quiet").err == ""
     assert names() == ["slice_0002.png"]
-    scene = load_scene(Path("scene.yaml"))
+    scene = clfractal.load_scene(Path("scene.yaml"))
     ends = [slice_scene(scene, Stack(count=8), number) for number in (1, 8)]
     centers = [renderer_of(end).plane.placed.center[1] for end in ends]
     assert centers == pytest.approx([1.75, -1.75])

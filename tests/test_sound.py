@@ -16,7 +16,6 @@ from scipy.io import wavfile
 
 import clfractal
 from clfractal.engine.loudness import Shaping, loudness, shaped
-from clfractal.errors import FileError
 from clfractal.files.columns import read_columns
 from clfractal.files.sound import Sound, read_sound
 from tests.shell import InProcess
@@ -160,7 +159,7 @@ DAMAGED = {
 @pytest.mark.parametrize("content", DAMAGED)
 def test_damaged_files(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.wav").write_bytes(content)
-    with pytest.raises(FileError) as caught:
+    with pytest.raises(clfractal.FileError) as caught:
         read_sound(tmp_path / "a.wav")
     assert DAMAGED[content] in caught.value.message
 
@@ -169,7 +168,7 @@ def test_damaged_files(tmp_path: Path, content: bytes) -> None:
 def test_any_bytes_are_read_or_refused(tmp_path_factory: pytest.TempPathFactory, content: bytes) -> None:
     path = tmp_path_factory.mktemp("sound") / "a.wav"
     path.write_bytes(_wave(FORM)[:12] + content)
-    with suppress(FileError):
+    with suppress(clfractal.FileError):
         assert np.isfinite(read_sound(path).samples).all()
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import clfractal
 from benchmarks.truth import __main__ as command
 from benchmarks.truth import noise, sphere, steps, subjects
 from benchmarks.truth.hits import SHARE, Hits, measure_hits
@@ -30,11 +31,8 @@ from benchmarks.truth.sphere import measure_sphere
 from benchmarks.truth.steps import Steps
 from clfractal.camera.views import scene_view
 from clfractal.cli import bench
-from clfractal.engine.engine import Engine
 from clfractal.formulas import catalog
 from clfractal.integrators.points import Distances, escape
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 
 JULIA = {"name": "quaternion_julia", "julia": [0, 0, 0, 0], "iterations": 30}
 CAMERAS = {
@@ -61,16 +59,16 @@ class Ball:
 
 
 @pytest.fixture(scope="module")
-def engine() -> Iterator[Engine]:
-    with Engine() as opened:
+def engine() -> Iterator[clfractal.Engine]:
+    with clfractal.Engine() as opened:
         yield opened
 
 
-def ball_scene(camera: str, side: int = 60) -> Scene:
+def ball_scene(camera: str, side: int = 60) -> clfractal.Scene:
     return subjects.bare({"formula": JULIA, "camera": CAMERAS[camera]}, side)
 
 
-def ball_seen(camera: str, engine: Engine) -> tuple[Seen, Mask]:
+def ball_seen(camera: str, engine: clfractal.Engine) -> tuple[Seen, Mask]:
     """A picture of the ball with exact hits, and which pixels' rays meet it."""
     seen = see(ball_scene(camera), engine)
     near, far = chord(seen.rays.origin, seen.rays.direction, np.zeros(3), 1.0)
@@ -82,7 +80,7 @@ def generator() -> np.random.Generator:
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_rays_and_distances_are_those_of_the_kernel(camera: str, engine: Engine) -> None:
+def test_rays_and_distances_are_those_of_the_kernel(camera: str, engine: clfractal.Engine) -> None:
     seen = see(ball_scene(camera), engine, "P.X", "P.Y", "P.Z")
     hit = np.isfinite(seen.t)
     assert 0.2 < hit.mean() < 0.8
@@ -138,7 +136,7 @@ def test_a_stretch_begins_where_the_ray_enters_the_ball(camera: str, shell: floa
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_rays_that_see_nothing_or_too_late_are_lost(camera: str, engine: Engine) -> None:
+def test_rays_that_see_nothing_or_too_late_are_lost(camera: str, engine: clfractal.Engine) -> None:
     seen, meets = ball_seen(camera, engine)
     assert measure_losses(seen, Ball(), 3600, generator()).lost == ()
     middle = 30 * 60 + 30
@@ -156,7 +154,7 @@ def test_rays_that_see_nothing_or_too_late_are_lost(camera: str, engine: Engine)
     assert late[31] == pytest.approx(5, abs=0.15)
 
 
-def test_hits_on_the_surface_are_told_from_those_before_it(engine: Engine) -> None:
+def test_hits_on_the_surface_are_told_from_those_before_it(engine: clfractal.Engine) -> None:
     seen, _ = ball_seen("orthographic", engine)
     width = float(seen.rays.footprint[0])
     near = measure_hits(seen, Ball(), 300, generator())
@@ -175,7 +173,7 @@ def test_hits_on_the_surface_are_told_from_those_before_it(engine: Engine) -> No
     assert len(before.floating) == before.tested
 
 
-def test_thin_sets_are_found_by_descents(engine: Engine) -> None:
+def test_thin_sets_are_found_by_descents(engine: clfractal.Engine) -> None:
     seen, _ = ball_seen("orthographic", engine)
     width = float(seen.rays.footprint[0])
     thin = measure_hits(replace(seen, t=seen.t - 0.2 * width), Ball(1e-6 * width), 100, generator())
@@ -185,7 +183,7 @@ def test_thin_sets_are_found_by_descents(engine: Engine) -> None:
     assert thin.reached > thin.within[0]
 
 
-def test_what_is_inside_is_what_the_program_counts_as_inside(engine: Engine) -> None:
+def test_what_is_inside_is_what_the_program_counts_as_inside(engine: clfractal.Engine) -> None:
     chain = catalog.load_chain("mandelbulb")
     points = generator().uniform(-1.2, 1.2, (500, 3))
     solid = Solid(chain, 6, engine.device)
@@ -197,7 +195,7 @@ def test_what_is_inside_is_what_the_program_counts_as_inside(engine: Engine) -> 
 
 
 @pytest.mark.parametrize("camera", CAMERAS)
-def test_a_picture_by_the_other_search_meets_the_sphere(camera: str, engine: Engine) -> None:
+def test_a_picture_by_the_other_search_meets_the_sphere(camera: str, engine: clfractal.Engine) -> None:
     """It narrows a hit down to the number type's precision, so this is what a true picture gives."""
     sphere = measure_sphere(camera, 96, engine, ["renderer.search=steps"])
     assert sphere.met
@@ -288,11 +286,11 @@ def subject_of(formula: str, side: int = SIDE) -> subjects.Subject:
     return subject
 
 
-def solid_of(subject: subjects.Subject, engine: Engine) -> Solid:
+def solid_of(subject: subjects.Subject, engine: clfractal.Engine) -> Solid:
     return Solid(subject.scene.chain, subject.scene.formula.iterations, engine.device)
 
 
-def hits_of(formula: str, engine: Engine) -> Hits:
+def hits_of(formula: str, engine: clfractal.Engine) -> Hits:
     subject = subject_of(formula)
     found = measure_hits(see(subject.scene, engine), solid_of(subject, engine), 200, np.random.default_rng(3))
     assert found.tested == 200
@@ -301,7 +299,7 @@ def hits_of(formula: str, engine: Engine) -> Hits:
 
 
 @pytest.mark.parametrize("camera", ["orthographic", "perspective"])
-def test_the_unit_sphere_has_its_area_depth_and_normals(camera: str, engine: Engine) -> None:
+def test_the_unit_sphere_has_its_area_depth_and_normals(camera: str, engine: clfractal.Engine) -> None:
     found = sphere.measure_sphere(camera, 300, engine)
     assert abs(found.area) <= sphere.MOST_AREA
     assert found.depth <= sphere.MOST_DEPTH
@@ -310,11 +308,11 @@ def test_the_unit_sphere_has_its_area_depth_and_normals(camera: str, engine: Eng
 
 # By its scalar rule; of degree 1; with thin sheets.
 @pytest.mark.parametrize("formula", ["mandelbulb", "mandelbox", "burning_ship"])
-def test_the_set_is_within_a_pixel_of_hits(formula: str, engine: Engine) -> None:
+def test_the_set_is_within_a_pixel_of_hits(formula: str, engine: clfractal.Engine) -> None:
     assert hits_of(formula, engine).within[0] >= SHARE
 
 
-def test_hast_is_near_its_hits(engine: Engine) -> None:
+def test_hast_is_near_its_hits(engine: clfractal.Engine) -> None:
     """Missed: seen from above, 97 % of its hits have an inside point within a pixel's width, not 98 %. It is full of
     valleys of the potential."""
     found = hits_of("hast", engine)
@@ -323,7 +321,7 @@ def test_hast_is_near_its_hits(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("formula", ["burning_ship", "hast"])
-def test_no_ray_passes_through_the_set(formula: str, engine: Engine) -> None:
+def test_no_ray_passes_through_the_set(formula: str, engine: clfractal.Engine) -> None:
     """The burning ship's thin sheets were lost where steps were a little too long."""
     subject = subject_of(formula, 480)
     found = measure_losses(
@@ -334,7 +332,7 @@ def test_no_ray_passes_through_the_set(formula: str, engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("height", [2.0, 0.35])
-def test_thin_sheets_and_threads_stay(height: float, engine: Engine) -> None:
+def test_thin_sheets_and_threads_stay(height: float, engine: clfractal.Engine) -> None:
     """Rays that meet a sheet without thickness see it, however flat they come; those through a thread see that."""
     scene = subjects.bare(
         {
@@ -372,9 +370,9 @@ def test_thin_sheets_and_threads_stay(height: float, engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("row", ["mandelbulb8-shadow", "hast2-shadow"])
-def test_rows_of_the_speed_table_take_fewer_steps(row: str, engine: Engine) -> None:
+def test_rows_of_the_speed_table_take_fewer_steps(row: str, engine: clfractal.Engine) -> None:
     """Missed: a quarter fewer than before were to be taken; what is looked at to land exactly costs some."""
     text, changes, _ = bench.ROWS[row]
-    stats = engine.render(load_scene(text, overrides=changes), precision="float32").stats
+    stats = engine.render(clfractal.load_scene(text, overrides=changes), precision="float32").stats
     share = stats["steps_per_ray"] / steps.record()["steps"][row]
     assert share <= {"mandelbulb8-shadow": 1.05, "hast2-shadow": 0.86}[row]

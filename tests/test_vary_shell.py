@@ -13,9 +13,7 @@ from PIL import Image
 
 import clfractal
 from clfractal.cli import vary
-from clfractal.engine.engine import Engine
 from clfractal.files.environment_map import read_environment
-from clfractal.scene.load import load_scene
 from tests.shell import SCENE, InProcess, works
 
 SMALL = ("--size", "32x18", "--count", "3")
@@ -39,14 +37,14 @@ def test_scenes_pictures_and_a_sheet(clf: InProcess) -> None:
     assert ended.out == ""
     assert names() == ["out", "sheet.png"]
     assert names("out") == [f"scene-0{n}.{kind}" for n in (1, 2, 3) for kind in ("png", "yaml")]
-    original = load_scene(Path("scene.yaml"), overrides=["formula.iterations=7"])
-    found = [load_scene(Path(f"out/scene-0{number}.yaml")) for number in (1, 2, 3)]
+    original = clfractal.load_scene(Path("scene.yaml"), overrides=["formula.iterations=7"])
+    found = [clfractal.load_scene(Path(f"out/scene-0{number}.yaml")) for number in (1, 2, 3)]
     for number, scene in enumerate(found, start=1):
         # Their own size is the scene's; the pictures are small, and hold the scene that they show.
         assert scene.image == original.image
         assert scene.formula.iterations == 7
         assert scene != original
-        assert load_scene(Path(f"out/scene-0{number}.png")) == scene
+        assert clfractal.load_scene(Path(f"out/scene-0{number}.png")) == scene
         picture = pixels(f"out/scene-0{number}.png")
         assert picture.shape == (18, 32, 3)
         assert picture.std() > 3
@@ -96,8 +94,8 @@ def test_small_pictures_have_the_scenes_proportions(clf: InProcess) -> None:
         )
     )
     assert pixels("scene-01.png").shape == (160, 320, 3)
-    found = load_scene(Path("scene-01.yaml"))
-    assert found.lights == load_scene(Path("scene.yaml")).lights
+    found = clfractal.load_scene(Path("scene-01.yaml"))
+    assert found.lights == clfractal.load_scene(Path("scene.yaml")).lights
 
 
 def test_ones_that_show_nothing_are_left_out(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -130,16 +128,16 @@ def test_a_scene_that_is_empty_itself_has_variations(clf: InProcess) -> None:
 
 
 def test_interrupted_complete_pairs_stay(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> None:
-    render = Engine.render
+    render = clfractal.Engine.render
     large: list[int] = []
 
-    def interrupted(engine: Engine, scene: Any, *arguments: Any, **settings: Any) -> Any:
+    def interrupted(engine: clfractal.Engine, scene: Any, *arguments: Any, **settings: Any) -> Any:
         large.extend([1] if scene.image.width == 32 else [])
         if len(large) == 2:
             raise KeyboardInterrupt
         return render(engine, scene, *arguments, **settings)
 
-    monkeypatch.setattr(Engine, "render", interrupted)
+    monkeypatch.setattr(clfractal.Engine, "render", interrupted)
     with pytest.raises(KeyboardInterrupt):
         clf("vary", "scene.yaml", *SMALL)
     assert names() == ["scene-01.png", "scene-01.yaml"]
@@ -194,7 +192,7 @@ def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     shutil.copy(folder("environments") / "dusk.exr", "maps/sky.exr")
     Path("maps/scene.yaml").write_text(SCENE + "environment: {file: sky.exr}\n")
     works(clf("vary", "maps/scene.yaml", *SMALL, "--quiet"))
-    found = load_scene(Path("scene-01.yaml"))
+    found = clfractal.load_scene(Path("scene-01.yaml"))
     assert found.environment is not None
     assert found.environment.file == "maps/sky.exr"
     assert read_environment("maps/sky.exr") is not None
@@ -208,4 +206,4 @@ def test_textures_stay_reachable(clf: InProcess) -> None:
     oak = "materials: {oak: {base: {color: {texture: oak.png}}}}\n"
     Path("maps/scene.yaml").write_text(SCENE + oak)
     works(clf("vary", "maps/scene.yaml", *SMALL, "--quiet"))
-    assert list(load_scene(Path("scene-01.yaml")).textures) == ["maps/oak.png"]
+    assert list(clfractal.load_scene(Path("scene-01.yaml")).textures) == ["maps/oak.png"]

@@ -18,13 +18,11 @@ import pytest
 
 import clfractal
 from clfractal.cluster import dispatch, tasks
-from clfractal.cluster.cluster import Cluster
 from clfractal.cluster.cluster_engine import ClusterEngine
 from clfractal.cluster.dispatch import Dispatcher, Work
 from clfractal.cluster.link import Link, Member, usual_key
 from clfractal.cluster.message import Message
 from clfractal.device.select import DeviceInfo
-from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
 from clfractal.engine.run import Counters, WorkItem
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, DeviceError, KernelBuildError
@@ -44,7 +42,7 @@ def in_a_loop(test: Callable[..., Coroutine[Any, Any, None]]) -> Callable[..., N
 
 @pytest.fixture(scope="module")
 def job() -> Job:
-    with Engine() as engine:
+    with clfractal.Engine() as engine:
         return engine.prepare(SCENE)
 
 
@@ -152,7 +150,7 @@ def test_each_answer_tells_its_render_device(job: Job) -> None:
             render_device=tasks.render_device_of(other),
         ),
     }
-    cluster = Cluster.__new__(Cluster)
+    cluster = clfractal.Cluster.__new__(clfractal.Cluster)
     cluster._begun, cluster._shares, cluster._closed, cluster._number = {}, {}, False, 0
     cluster._dispatcher = SimpleNamespace(  # type: ignore[assignment]
         give=lambda work: [work.answers.put(each) for each in answers.values()],
@@ -176,7 +174,7 @@ def test_each_answer_tells_its_render_device(job: Job) -> None:
 def test_workers_are_counted_while_they_come_and_go(job: Job) -> None:
     """Another thread reads what the loop's thread changes."""
     own = linked(SimpleNamespace(rpc=SimpleNamespace(remove=lambda _: None)), [])
-    cluster = Cluster.__new__(Cluster)
+    cluster = clfractal.Cluster.__new__(clfractal.Cluster)
     cluster._dispatcher = SimpleNamespace(link=own)  # type: ignore[assignment]
     ended = threading.Event()
 

@@ -19,7 +19,6 @@ from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
 from clfractal.engine.show import Arrangement, Look, Shower
 from clfractal.images.tiled import Floats
-from clfractal.scene.model import Scene
 from tests.scenes import bulb_text
 
 SIZE = (96, 64)
@@ -29,17 +28,17 @@ LAYOUT = (
 )
 
 
-def scene_of(*overrides: str) -> Scene:
+def scene_of(*overrides: str) -> clfractal.Scene:
     """A small scene with values replaced as by `--set`."""
     return clfractal.load_scene(BULB, overrides=overrides)
 
 
-def job_of(scene: Scene, device: Device) -> Job:
+def job_of(scene: clfractal.Scene, device: Device) -> Job:
     """The job of a picture on a canvas."""
     return prepare(scene, device, channels=CHANNELS)
 
 
-def look_of(scene: Scene, **values: Any) -> Look:
+def look_of(scene: clfractal.Scene, **values: Any) -> Look:
     """How a scene wants to be shown."""
     output = scene.output
     settings = {"exposure": output.stops, "tone": output.tone, "stereo": scene.stereo, **values}

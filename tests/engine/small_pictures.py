@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 import clfractal
-from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.model import Scene
 from tests.scenes import bulb_text
 
 SIZE = (64, 48)
@@ -16,13 +14,13 @@ BULB = bulb_text(SIZE)
 VOLUME = BULB + "renderer: {type: volume, resolution: 32, value: coverage}\n"
 
 
-def equal(first: Framebuffer, second: Framebuffer) -> None:
+def equal(first: clfractal.Framebuffer, second: clfractal.Framebuffer) -> None:
     assert first.channels == second.channels
     for name in first.channels:
         np.testing.assert_array_equal(first[name], second[name], name)
 
 
-def changed(text: str, *overrides: str) -> Scene:
+def changed(text: str, *overrides: str) -> clfractal.Scene:
     return clfractal.load_scene(text, overrides=overrides)
 
 
@@ -36,5 +34,5 @@ output: {channels: [R, G, B, A, Z, N.X, P.Y, iterations, steps]}
 """
 
 
-def same(one: Framebuffer, other: Framebuffer) -> bool:
+def same(one: clfractal.Framebuffer, other: clfractal.Framebuffer) -> bool:
     return all(np.array_equal(one[name], other[name], equal_nan=True) for name in one)

@@ -14,24 +14,19 @@ import clfractal
 from benchmarks.cancel import waits
 from clfractal.cli.bench import HAST
 from clfractal.device import isolate, launch
-from clfractal.device.cancel import CancelToken
 from clfractal.device.launch import Pace
 from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device, sees_host_writes
 from clfractal.device.structs import Precision
 from clfractal.device.watched import CANCELLED, Watched, is_watched
-from clfractal.engine.engine import Engine
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.refine import pass_ranges
 from clfractal.engine.run import Progress, run
-from clfractal.errors import Stopped
 from clfractal.formulas.catalog import load_chain
-from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import points
 from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.passes import SAMPLING
 from clfractal.integrators.plan import Plan
-from clfractal.scene.model import Scene
 from tests.calls import raising
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
 from tests.render.passes import RENDERERS, SIZE, scene_with
@@ -40,7 +35,7 @@ from tests.variants import one_of
 
 
 def test_a_token_is_set_by_any_thread() -> None:
-    token = CancelToken()
+    token = clfractal.CancelToken()
     assert not token.cancelled
     assert not token()
     token.check()
@@ -49,7 +44,7 @@ def test_a_token_is_set_by_any_thread() -> None:
     thread.join()
     assert token.cancelled
     assert token()
-    with pytest.raises(Stopped):
+    with pytest.raises(clfractal.Stopped):
         token.check()
 
 
@@ -57,7 +52,7 @@ def test_cancels_at_random_moments(device: Device) -> None:
     """Ten times looser than `python -m benchmarks.cancel` measures: other tests run beside this one."""
     budget = 0.02
     scene = clfractal.load_scene(HAST, overrides=["image.width=500", "image.height=500"])
-    with Engine(device, budget_seconds=budget) as engine:
+    with clfractal.Engine(device, budget_seconds=budget) as engine:
         found = waits(engine, scene, 20)
         equal(engine.render(changed(BULB)), clfractal.render(changed(BULB)))
     assert np.median(found) < 20 * budget
@@ -66,31 +61,31 @@ def test_cancels_at_random_moments(device: Device) -> None:
 
 @pytest.mark.parametrize("text", [BULB, VOLUME])
 def test_a_token_that_is_set_starts_nothing(text: str, device: Device) -> None:
-    token = CancelToken()
+    token = clfractal.CancelToken()
     token.cancel()
-    with Engine(device) as engine:
-        with pytest.raises(Stopped):
+    with clfractal.Engine(device) as engine:
+        with pytest.raises(clfractal.Stopped):
             engine.render(changed(text), token=token)
         equal(engine.render(changed(text)), clfractal.render(changed(text)))
 
 
 def test_many_samples_of_few_pixels(device: Device) -> None:
     """One tile with 60,000 samples: its samples are split, or nothing could end it."""
-    token = CancelToken()
+    token = clfractal.CancelToken()
     scene = changed(BULB, "image.width=32", "image.height=32")
-    with Engine(device, budget_seconds=0.02) as engine:
+    with clfractal.Engine(device, budget_seconds=0.02) as engine:
         engine.render(scene)
         timer = threading.Timer(0.2, token.cancel)
         start = time.perf_counter()
         timer.start()
-        with pytest.raises(Stopped):
+        with pytest.raises(clfractal.Stopped):
             engine.render(scene, samples=60_000, token=token)
         assert time.perf_counter() - start < 5
 
 
 def test_a_build_is_left(device: Device) -> None:
     """Compiling goes on in a child; who waits for it need not."""
-    token = CancelToken()
+    token = clfractal.CancelToken()
     # A formula that nobody has compiled, and large.
     formula = "{variables: [x, y, z], map: ["
     terms = " + ".join(f"sin({number}.125 * x) * cos({number}.25 * y)" for number in range(60))
@@ -99,12 +94,12 @@ def test_a_build_is_left(device: Device) -> None:
     )
     formula += " bounds: {center: [0, 0, 0], radius: 2}}"
     scene = clfractal.load_scene(BULB, overrides=[f"formula={{iterations: 8, inline: {formula}}}"])
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         engine.render(changed(BULB))  # lanes are measured
         timer = threading.Timer(0.3, token.cancel)
         start = time.perf_counter()
         timer.start()
-        with pytest.raises(Stopped):
+        with pytest.raises(clfractal.Stopped):
             engine.render(scene, token=token)
         assert time.perf_counter() - start < 3
         engine.render(changed(BULB))
@@ -138,7 +133,7 @@ def test_after_an_error_the_device_is_idle(
     monkeypatch.setattr(launch, "_end", noted)
 
     scene = changed(BULB, "image.width=640", "image.height=480", "renderer.samples=4")
-    with Engine(device, budget_seconds=0.001) as engine:
+    with clfractal.Engine(device, budget_seconds=0.001) as engine:
         with pytest.raises(error) as raised:
             engine.render(scene, raising(error))
         # (The exception is still alive, and with it all frames that it went through.)
@@ -152,7 +147,7 @@ def test_after_an_error_the_device_is_idle(
 NOISY: dict[str, Any] = {"noise": 0.02, "min_samples": 4}
 
 
-class Impatient(CancelToken):
+class Impatient(clfractal.CancelToken):
     """Ends work when it was asked so many times whether to: within a pass of one launch, too."""
 
     def __init__(self, questions: int) -> None:
@@ -176,25 +171,27 @@ class Impatient(CancelToken):
 class Interrupted:
     """Renders a picture in passes, of which each is interrupted a few times."""
 
-    def __init__(self, scene: Scene, plan: Plan, device: Device, executor: LocalExecutor, seed: int) -> None:
+    def __init__(
+        self, scene: clfractal.Scene, plan: Plan, device: Device, executor: LocalExecutor, seed: int
+    ) -> None:
         self.job, self.plan, self.executor = job_of(scene, plan, device), plan, executor
         self.size = (scene.image.width, scene.image.height)
         self.random = np.random.default_rng(seed)
         self.stops = 0
 
-    def framebuffer(self, ranges: list[tuple[int, int]], tries: int) -> Framebuffer:
+    def framebuffer(self, ranges: list[tuple[int, int]], tries: int) -> clfractal.Framebuffer:
         """The picture; each pass is tried so many times until it may be finished."""
         for samples in ranges:
             for _ in range(tries):
                 self.try_once(samples)
             self.attempt(Impatient(int(self.random.integers(0, 3))), samples)
-            framebuffer = Framebuffer(self.plan.channels, self.size, self.plan.region)
+            framebuffer = clfractal.Framebuffer(self.plan.channels, self.size, self.plan.region)
             run(self.job, [framebuffer], self.executor, samples=samples)
         return framebuffer
 
     def try_once(self, samples: tuple[int, int]) -> None:
         """A pass that is told to end after a random number of launches, or at a random time within one."""
-        token = CancelToken()
+        token = clfractal.CancelToken()
         launches = int(self.random.integers(0, 12))
         timer = threading.Timer(float(self.random.random() ** 2 * 0.02), token.cancel)
         seen = 0
@@ -212,16 +209,19 @@ class Interrupted:
         timer.cancel()
 
     def attempt(
-        self, token: CancelToken, samples: tuple[int, int], progress: Callable[[Progress], None] | None = None
+        self,
+        token: clfractal.CancelToken,
+        samples: tuple[int, int],
+        progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        framebuffer = Framebuffer(self.plan.channels, self.size, self.plan.region)
+        framebuffer = clfractal.Framebuffer(self.plan.channels, self.size, self.plan.region)
         try:
             run(self.job, [framebuffer], self.executor, token=token, samples=samples, progress=progress)
-        except Stopped:
+        except clfractal.Stopped:
             self.stops += 1
 
 
-def same_bits(found: Framebuffer, wanted: Framebuffer) -> None:
+def same_bits(found: clfractal.Framebuffer, wanted: clfractal.Framebuffer) -> None:
     np.testing.assert_array_equal(stacked(found).view(np.uint32), stacked(wanted).view(np.uint32))
 
 
@@ -255,7 +255,7 @@ def test_with_any_number_of_lanes(lanes: int, device: Device) -> None:
     """Lanes of one packet that have different numbers of samples, because some of their pixels are done."""
     scene = scene_with("surface", **NOISY)
     plan = plan_of(scene, device, lanes=lanes)
-    whole = Framebuffer(plan.channels, SIZE, plan.region)
+    whole = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
     run(job_of(scene, plan, device), [whole], LocalExecutor(device))
     assert len(np.unique(whole["samples"])) > 1
     executor = LocalExecutor(device, budget_seconds=1e-4)
@@ -273,16 +273,16 @@ def test_a_pass_within_a_heavy_tile(device: Device) -> None:
     stops = 0
     for samples in ((0, 128), (128, 1024)):
         for wait in (0.01, 0.03, 0.06, 0.1, 0.15):
-            token = CancelToken()
+            token = clfractal.CancelToken()
             timer = threading.Timer(wait, token.cancel)
             timer.start()
             try:
-                framebuffer = Framebuffer(plan.channels, (64, 64), plan.region)
+                framebuffer = clfractal.Framebuffer(plan.channels, (64, 64), plan.region)
                 run(job, [framebuffer], executor, token=token, samples=samples)
-            except Stopped:
+            except clfractal.Stopped:
                 stops += 1
             timer.join()
-        framebuffer = Framebuffer(plan.channels, (64, 64), plan.region)
+        framebuffer = clfractal.Framebuffer(plan.channels, (64, 64), plan.region)
         run(job, [framebuffer], executor, samples=samples)
     assert stops >= 4
     same_bits(framebuffer, wanted)
@@ -294,7 +294,7 @@ def test_a_pass_that_was_finished_can_be_done_again(device: Device) -> None:
     plan = plan_of(scene, device)
     executor = LocalExecutor(device)
     for samples in ((0, 1), (0, 1), (1, 4), (1, 4), (1, 4), (4, 16), (4, 16)):
-        framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+        framebuffer = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
         run(job_of(scene, plan, device), [framebuffer], executor, samples=samples)
     same_bits(framebuffer, shoot(scene, device))
 
@@ -306,12 +306,18 @@ def test_an_interrupted_whole_picture(device: Device) -> None:
     executor = LocalExecutor(device, budget_seconds=1e-5)
     job = job_of(scene, plan, device)
     for wait in (0.001, 0.003, 0.01):
-        token = CancelToken()
+        token = clfractal.CancelToken()
         threading.Timer(wait, token.cancel).start()
-        with pytest.raises(Stopped):
-            run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, token=token, samples=(0, 16))
+        with pytest.raises(clfractal.Stopped):
+            run(
+                job,
+                [clfractal.Framebuffer(plan.channels, SIZE, plan.region)],
+                executor,
+                token=token,
+                samples=(0, 16),
+            )
         time.sleep(wait)
-    framebuffer = Framebuffer(plan.channels, SIZE, plan.region)
+    framebuffer = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
     run(job, [framebuffer], executor, samples=(0, 16))
     same_bits(framebuffer, shoot(scene, device))
 
@@ -323,14 +329,20 @@ def test_what_was_kept_goes_with_a_view_that_could_not_be_taken(device: Device) 
     executor = LocalExecutor(device)
     job = job_of(scene, plan, device)
     assert not executor.keeps(1)
-    run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(0, 1))
+    run(job, [clfractal.Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(0, 1))
     assert executor.keeps(1)
     assert not executor.keeps(2)
     executor.kept = type(executor.kept)()
-    token = CancelToken()
+    token = clfractal.CancelToken()
     token.cancel()
-    with pytest.raises(Stopped):
-        run(job, [Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(1, 2), token=token)
+    with pytest.raises(clfractal.Stopped):
+        run(
+            job,
+            [clfractal.Framebuffer(plan.channels, SIZE, plan.region)],
+            executor,
+            samples=(1, 2),
+            token=token,
+        )
     assert not executor.keeps(1)
     executor.forget()
 
@@ -381,9 +393,9 @@ def test_a_cancel_ends_long_orbits(kind: str, device: Device) -> None:
     scene = clfractal.load_scene(LONG + ENDLESS[kind])
     short = scene.model_copy(update={"formula": scene.formula.model_copy(update={"iterations": 20})})
     expected = clfractal.render(short)
-    with Engine(device, budget_seconds=0.02) as engine:
+    with clfractal.Engine(device, budget_seconds=0.02) as engine:
         equal(engine.render(short), expected)
-        token, asked = CancelToken(), []
+        token, asked = clfractal.CancelToken(), []
 
         def cancel() -> None:
             asked.append(time.perf_counter())
@@ -391,7 +403,7 @@ def test_a_cancel_ends_long_orbits(kind: str, device: Device) -> None:
 
         timer = threading.Timer(0.4, cancel)
         timer.start()
-        with pytest.raises(Stopped):
+        with pytest.raises(clfractal.Stopped):
             engine.render(scene, token=token)
         assert time.perf_counter() - asked[0] < 2
         # Nothing of it is left: the next picture is right.
@@ -399,13 +411,13 @@ def test_a_cancel_ends_long_orbits(kind: str, device: Device) -> None:
 
 
 def test_lists_of_points_are_cancelled(device: Device) -> None:
-    chain, token = load_chain("hast"), CancelToken()
+    chain, token = load_chain("hast"), clfractal.CancelToken()
     places = np.random.default_rng(1).uniform(-0.1, 0.1, (200_000, 3))
     timer = threading.Timer(0.3, token.cancel)
     start = time.perf_counter()
     timer.start()
     lanes = best_lanes(device, "float32")
-    with pytest.raises(Stopped):
+    with pytest.raises(clfractal.Stopped):
         points.escape(chain, places, 1_000_000, device=device, lanes=lanes, token=token)
     assert time.perf_counter() - start < 10
     counts, inside = points.escape(chain, places[:100], 50, device=device, lanes=lanes)

@@ -19,8 +19,6 @@ from clfractal.cluster.guard import check_main
 from clfractal.cluster.local_cluster import Place
 from clfractal.cluster.message import Array, Digests, pack, unpack
 from clfractal.cluster.sizes import SECONDS, Pace
-from clfractal.engine.engine import Engine
-from clfractal.errors import SceneError
 from tests.shell import InProcess, environment
 
 
@@ -77,7 +75,7 @@ def test_a_job_travels_without_its_large_arrays(tmp_path: Path) -> None:
         "renderer: {type: volume, file: grid.npy}\n"
     )
     (tmp_path / "scene.yaml").write_text(text)
-    with Engine() as engine:
+    with clfractal.Engine() as engine:
         job = engine.prepare(tmp_path / "scene.yaml")
         digests = Digests()
         message = pack(job, digests)
@@ -193,5 +191,5 @@ def test_a_program_with_a_guard_may_start_processes(text: str, tmp_path: Path) -
 
 def test_a_process_that_runs_the_program_again_starts_none(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(multiprocessing.current_process(), "_inheriting", True, raising=False)
-    with pytest.raises(SceneError, match="below `if __name__"):
+    with pytest.raises(clfractal.SceneError, match="below `if __name__"):
         check_main("local:2")

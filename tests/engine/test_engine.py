@@ -13,13 +13,8 @@ import clfractal
 from clfractal.device import program
 from clfractal.device.select import Device, choose
 from clfractal.engine.drawing import Drawing
-from clfractal.engine.engine import Engine
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
-from clfractal.errors import ClfractalError, DeviceError, SceneError
-from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.voxels import fill
 from tests.calls import counted, raising
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
@@ -46,14 +41,14 @@ def test_changes_leave_nothing_of_the_picture_before(device: Device) -> None:
     """One after the other, and back: each has the bits of an engine that knows nothing else."""
     scenes = [changed(BULB, *overrides) for overrides in CHANGES.values()]
     alone = [clfractal.render(scene) for scene in scenes]
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         for round_trip in (scenes, scenes[::-1]):
             for scene in round_trip:
                 equal(engine.render(scene), alone[scenes.index(scene)])
 
 
 def test_what_is_equal_is_not_sent_again(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         engine.render(changed(BULB))
         sent = counted(monkeypatch, Drawing, "_sent")
         loaded = counted(monkeypatch, program, "_compile")
@@ -81,7 +76,7 @@ def test_a_grid_is_filled_once(override: str, device: Device, monkeypatch: pytes
     scenes = [changed(VOLUME), changed(VOLUME, override)]
     alone = [clfractal.render(scene) for scene in scenes]
     filled = counted(monkeypatch, fill._Filler, "run")
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         for _ in range(2):
             for scene, expected in zip(scenes, alone, strict=True):
                 equal(engine.render(scene), expected)
@@ -90,7 +85,7 @@ def test_a_grid_is_filled_once(override: str, device: Device, monkeypatch: pytes
 
 def test_a_grid_that_nobody_asks_for_is_dropped(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     filled = counted(monkeypatch, fill._Filler, "run")
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         engine.render(changed(VOLUME))
         for _ in range(3):
             engine.render(changed(BULB))
@@ -101,14 +96,14 @@ def test_a_grid_that_nobody_asks_for_is_dropped(device: Device, monkeypatch: pyt
 
 
 def test_one_thread_at_a_time(device: Device) -> None:
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         inside, told = threading.Event(), []
 
         def other() -> None:
             inside.wait(60)
             try:
                 engine.render(changed(BULB))
-            except ClfractalError as error:
+            except clfractal.ClfractalError as error:
                 told.append(str(error))
 
         thread = threading.Thread(target=other)
@@ -124,7 +119,7 @@ def test_one_thread_at_a_time(device: Device) -> None:
             "this engine is already in use; give each thread its own engine, or finish the refinement first"
         ]
         # And from one thread after the other as one likes.
-        found: list[Framebuffer] = []
+        found: list[clfractal.Framebuffer] = []
         thread = threading.Thread(target=lambda: found.append(engine.render(changed(BULB))))
         thread.start()
         thread.join(120)
@@ -132,16 +127,16 @@ def test_one_thread_at_a_time(device: Device) -> None:
 
 
 def test_a_closed_engine_says_so(device: Device) -> None:
-    engine = Engine(device)
+    engine = clfractal.Engine(device)
     engine.close()
     engine.close()  # as `with` does after it
-    with pytest.raises(ClfractalError, match=r"^this engine is closed$"):
+    with pytest.raises(clfractal.ClfractalError, match=r"^this engine is closed$"):
         engine.render(changed(BULB))
 
 
 def test_an_engine_goes_on_after_an_error(device: Device) -> None:
-    with Engine(device) as engine:
-        with pytest.raises(SceneError):
+    with clfractal.Engine(device) as engine:
+        with pytest.raises(clfractal.SceneError):
             engine.render(changed(BULB), region=(0, 0, 1000, 1))
 
         with pytest.raises(RuntimeError):
@@ -158,7 +153,7 @@ def test_devices_with_contexts_of_their_own(device: Device) -> None:
     other = device.reopened()
     assert other.context != device.context
     assert device.reopened([]).properties == ()
-    with Engine(other) as own, Engine(device) as shared:
+    with clfractal.Engine(other) as own, clfractal.Engine(device) as shared:
         equal(own.render(changed(BULB)), shared.render(changed(BULB)))
     assert platform[1] == other.cl_device.platform
 
@@ -167,7 +162,7 @@ class TestRefinement:
     def test_it_ends_with_the_bits_of_a_render(self, device: Device) -> None:
         for overrides in ((), ("renderer.samples=6",), ("renderer.samples=16", "renderer.noise=0.05")):
             scene = changed(BULB, *overrides)
-            with Engine(device) as engine:
+            with clfractal.Engine(device) as engine:
                 framebuffers = list(engine.refine(scene))
                 whole = engine.render(scene)
             equal(framebuffers[-1], whole)
@@ -178,7 +173,7 @@ class TestRefinement:
             ]
 
     def test_coarse_pictures_come_nearer(self, device: Device) -> None:
-        with Engine(device) as engine:
+        with clfractal.Engine(device) as engine:
             framebuffers = list(engine.refine(changed(BULB, "image.width=160", "image.height=120")))
         errors = [
             float(np.abs(framebuffer["A"] - framebuffers[-1]["A"]).mean()) for framebuffer in framebuffers
@@ -193,21 +188,21 @@ class TestRefinement:
         layout = "layout={gap: 3, views: [{renderer: {samples: 3}}, {camera: {position: [2, 1, 2]}}]}"
         stereo = f"stereo={{mode: {mode}, screen_width: 0.5, screen_distance: 0.7}}"
         scene = changed(BULB, layout, stereo)
-        with Engine(device) as engine:
+        with clfractal.Engine(device) as engine:
             *_, last = engine.refine(scene)
             equal(last, engine.render(scene))
 
     def test_of_a_region(self, device: Device) -> None:
         scene, region = changed(BULB, "renderer.samples=2"), (13, 9, 40, 30)
-        with Engine(device) as engine:
+        with clfractal.Engine(device) as engine:
             framebuffers = list(engine.refine(scene, region=region))
             equal(framebuffers[-1], engine.render(scene, region=region))
 
     def test_closing_one_frees_the_engine(self, device: Device) -> None:
-        with Engine(device) as engine:
+        with clfractal.Engine(device) as engine:
             refinement = engine.refine(changed(BULB, "renderer.samples=64"))
             next(refinement)
-            with pytest.raises(ClfractalError, match="already in use"):
+            with pytest.raises(clfractal.ClfractalError, match="already in use"):
                 engine.render(changed(BULB))
             refinement.close()
             engine.render(changed(BULB))
@@ -217,7 +212,7 @@ class TestRefinement:
     ) -> None:
         told: list[str] = []
         scene = changed(BULB, "renderer.samples=4")
-        with Engine(device, tell=told.append) as engine:
+        with clfractal.Engine(device, tell=told.append) as engine:
             whole = engine.render(scene)
             monkeypatch.setattr(Drawing, "kept_bytes", lambda self, tiles: 1 << 60)
             framebuffers = list(engine.refine(scene))
@@ -234,10 +229,10 @@ class TestRefinement:
         shown: list[str] = []
 
         class Handle:
-            def update(self, framebuffer: Framebuffer) -> None:
+            def update(self, framebuffer: clfractal.Framebuffer) -> None:
                 shown.append(framebuffer.stage)
 
-        def display(framebuffer: Framebuffer, *, display_id: bool) -> Handle:
+        def display(framebuffer: clfractal.Framebuffer, *, display_id: bool) -> Handle:
             assert display_id
             assert framebuffer._repr_png_() is not None
             shown.append(framebuffer.stage)
@@ -246,7 +241,7 @@ class TestRefinement:
         module = types.ModuleType("IPython.display")
         module.display = display  # type: ignore[attr-defined]
         monkeypatch.setitem(sys.modules, "IPython.display", module)
-        with Engine(device) as engine:
+        with clfractal.Engine(device) as engine:
             engine.refine(changed(BULB))._ipython_display_()
         assert shown == ["every 8th pixel", "every 4th pixel", "every 2nd pixel", ""]
 
@@ -255,7 +250,7 @@ class TestRefinement:
 
         told: list[str] = []
         monkeypatch.setattr(local, "_WORTH_TELLING", 1 << 10)
-        with Engine(device, tell=told.append) as engine:
+        with clfractal.Engine(device, tell=told.append) as engine:
             list(engine.refine(changed(BULB, "renderer.samples=2", "output.channels=[R, G, B]")))
         # Three colours and the number of samples, of 2 x 2 tiles.
         assert told == ["a picture in passes needs 0.1 MiB of device memory"]
@@ -264,18 +259,18 @@ class TestRefinement:
 def test_a_view_that_half_arrived_leaves_nothing(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Out of memory after some of a new view's data were sent: the old view is complete again afterwards."""
     old, new = changed(BULB), changed(BULB, *CHANGES["camera"], *CHANGES["light"], *CHANGES["a palette"])
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         expected = engine.render(old)
         sent, calls = Drawing._sent, []
 
         def failing(self: Drawing, *arguments: object) -> object:
             calls.append(arguments)
             if len(calls) == 2:
-                raise DeviceError("out of device memory")
+                raise clfractal.DeviceError("out of device memory")
             return sent(self, *arguments)  # type: ignore[arg-type]
 
         monkeypatch.setattr(Drawing, "_sent", failing)
-        with pytest.raises(DeviceError):
+        with pytest.raises(clfractal.DeviceError):
             engine.render(new)
         monkeypatch.setattr(Drawing, "_sent", sent)
         equal(engine.render(old), expected)
@@ -296,7 +291,7 @@ def test_flags_follow_the_number_type_where_the_text_does_not(
 
     monkeypatch.setattr(program, "build", noted)
     monkeypatch.setattr(program, "loaded", lambda *_, **__: None)
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         for precision in ("float32", "float64", "float64"):
             engine.render(changed(VOLUME), precision=precision)
     assert flags == [program.math_flags("float32"), program.math_flags("float64")]
@@ -319,19 +314,19 @@ MARKED = (
 
 @pytest.mark.parametrize("rest", ["", "stereo: {}\n", "layout: {views: [{}, {fog: {}}]}\n"])
 def test_unfinished_work_goes_on_with_other_bookmarks(device: Device, rest: str) -> None:
-    plain, marked = (prepare(load_scene(text + rest), device) for text in (PLAIN, MARKED))
+    plain, marked = (prepare(clfractal.load_scene(text + rest), device) for text in (PLAIN, MARKED))
     assert "bookmarks" not in plain.identity(0)["scene"]
     for number in range(len(plain.views)):
         assert plain.identity(number) == marked.identity(number)
-    other = prepare(load_scene(PLAIN.replace("-3", "-4") + rest), device)
+    other = prepare(clfractal.load_scene(PLAIN.replace("-3", "-4") + rest), device)
     assert plain.identity(0) != other.identity(0)
 
 
 def test_the_picture_is_the_same_and_keeps_them(device: Device, tmp_path: Path) -> None:
-    plain, marked = (clfractal.render(load_scene(text)) for text in (PLAIN, MARKED))
+    plain, marked = (clfractal.render(clfractal.load_scene(text)) for text in (PLAIN, MARKED))
     for name in plain.channels:
         np.testing.assert_array_equal(plain[name], marked[name])
     marked.save(tmp_path / "marked.exr")
-    kept = load_scene(tmp_path / "marked.exr")
-    assert isinstance(kept, Scene)
+    kept = clfractal.load_scene(tmp_path / "marked.exr")
+    assert isinstance(kept, clfractal.Scene)
     assert list(kept.bookmarks) == ["front", "top"]

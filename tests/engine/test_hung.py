@@ -14,18 +14,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from clfractal.device.cancel import CancelToken
+import clfractal
 from clfractal.device.select import Device, choose
 from clfractal.engine import sharing
-from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Result, WorkItem
 from clfractal.engine.several import SeveralExecutor
 from clfractal.engine.sharing import Shared
-from clfractal.errors import DeviceError
 from clfractal.files.exr import read_exr
-from clfractal.images.framebuffer import Framebuffer
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
@@ -51,7 +48,7 @@ class Hanging(LocalExecutor):
     hang: Hang
 
     def execute(
-        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+        self, job: Job, items: Iterable[WorkItem], token: clfractal.CancelToken | None = None
     ) -> Generator[Result]:
         hang, left = self.hang, self.hang.after
         try:
@@ -71,14 +68,14 @@ class Waiting(LocalExecutor):
     hang: Hang
 
     def execute(
-        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+        self, job: Job, items: Iterable[WorkItem], token: clfractal.CancelToken | None = None
     ) -> Generator[Result]:
         for result in super().execute(job, items, token):
             assert self.hang.began.wait(30)
             yield result
 
 
-def hanging(engine: Engine, *hangs: Hang) -> SeveralExecutor:
+def hanging(engine: clfractal.Engine, *hangs: Hang) -> SeveralExecutor:
     """Gives an engine two devices of which the first one hangs, or both."""
     shared = engine.executor
     assert isinstance(shared, SeveralExecutor)
@@ -91,8 +88,8 @@ def hanging(engine: Engine, *hangs: Hang) -> SeveralExecutor:
 
 
 @pytest.fixture(scope="module")
-def whole(device: Device) -> Framebuffer:
-    with Engine(device) as engine:
+def whole(device: Device) -> clfractal.Framebuffer:
+    with clfractal.Engine(device) as engine:
         return engine.render(SCENE)
 
 
@@ -105,9 +102,9 @@ def hang(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hang]:
     found.freed.set()
 
 
-def test_a_hung_device_is_left_out(device: Device, whole: Framebuffer, hang: Hang) -> None:
+def test_a_hung_device_is_left_out(device: Device, whole: clfractal.Framebuffer, hang: Hang) -> None:
     said: list[str] = []
-    with Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
         shared = hanging(engine, hang)
         framebuffer = engine.render(SCENE)
         assert same(framebuffer, whole)
@@ -123,7 +120,7 @@ def test_a_hung_device_is_left_out(device: Device, whole: Framebuffer, hang: Han
 
 
 def test_a_device_that_comes_back_late_does_no_harm(
-    device: Device, whole: Framebuffer, hang: Hang, monkeypatch: pytest.MonkeyPatch
+    device: Device, whole: clfractal.Framebuffer, hang: Hang, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It comes back while the other one still has its tiles to do."""
     execute = LocalExecutor.execute
@@ -141,7 +138,7 @@ def test_a_device_that_comes_back_late_does_no_harm(
         if "is left out" in line:
             hang.freed.set()
 
-    with Engine(halves_of(device), budget_seconds=0.01, tell=tell) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01, tell=tell) as engine:
         shared = hanging(engine, hang)
         framebuffer = engine.render(SCENE)
         assert late == [True]
@@ -155,16 +152,20 @@ def test_a_device_that_comes_back_late_does_no_harm(
 
 def test_all_devices_hang(device: Device, hang: Hang) -> None:
     other = Hang(after=15, freed=hang.freed)
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         hanging(engine, hang, other)
-        with pytest.raises(DeviceError, match=r"no device is left: .* has not answered for") as caught:
+        with pytest.raises(
+            clfractal.DeviceError, match=r"no device is left: .* has not answered for"
+        ) as caught:
             engine.render(SCENE)
         assert caught.value.status == 3
 
 
-def test_passes_of_a_hung_device_begin_again(device: Device, whole: Framebuffer, hang: Hang) -> None:
+def test_passes_of_a_hung_device_begin_again(
+    device: Device, whole: clfractal.Framebuffer, hang: Hang
+) -> None:
     """It hangs when it has some samples of tiles, which nobody else has."""
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         shared = hanging(engine, hang)
         hang.after = 10_000
         hang.began.set()
@@ -177,9 +178,11 @@ def test_passes_of_a_hung_device_begin_again(device: Device, whole: Framebuffer,
         assert list(shared.failures) == [0]
 
 
-def test_a_device_that_does_not_end_is_left_out(device: Device, whole: Framebuffer, hang: Hang) -> None:
+def test_a_device_that_does_not_end_is_left_out(
+    device: Device, whole: clfractal.Framebuffer, hang: Hang
+) -> None:
     """The caller stops; the hung device is waited for no longer than usual, and used no more."""
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         shared = hanging(engine, hang)
         hang.after = 0
 
@@ -267,7 +270,7 @@ def started(folder: Path, patience: float) -> Running:
     return Running(folder, words=[sys.executable, "-P", "-c", PROGRAM, str(patience), *given])
 
 
-def test_the_program_ends_although_a_thread_hangs(whole: Framebuffer, tmp_path: Path) -> None:
+def test_the_program_ends_although_a_thread_hangs(whole: clfractal.Framebuffer, tmp_path: Path) -> None:
     status, told = started(tmp_path, 1.0).ended_by()
     assert status == 0, told
     assert "is left out, others do its work: " in told

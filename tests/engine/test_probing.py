@@ -12,11 +12,8 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
-from clfractal.engine.engine import Engine
 from clfractal.engine.prepare import with_size
-from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.probe import CHANNELS, Probe
-from clfractal.scene.model import Scene
 from tests.render.shots import BALL, BALL_RADIUS, engine_of
 from tests.scenes import scene_of
 from tests.shell import InProcess, works
@@ -35,11 +32,11 @@ camera: {position: [0, -3, 0]}
 
 
 @pytest.fixture
-def engine(device: Device) -> Engine:
+def engine(device: Device) -> clfractal.Engine:
     return engine_of(device)
 
 
-def ball(camera: dict[str, Any] | None = None, **sections: Any) -> Scene:
+def ball(camera: dict[str, Any] | None = None, **sections: Any) -> clfractal.Scene:
     return scene_of(BALL, {**CAMERA, **(camera or {})}, SIZE, renderer=FINE, **sections)
 
 
@@ -65,7 +62,7 @@ def on_the_ball(found: Probe, x: int, y: int) -> None:
 
 
 @pytest.mark.parametrize("lens", [{}, {"f_number": 0.5, "focus_distance": 5}])
-def test_a_point_of_the_ball(lens: dict[str, Any], engine: Engine) -> None:
+def test_a_point_of_the_ball(lens: dict[str, Any], engine: clfractal.Engine) -> None:
     """Through a lens, too: the ray goes through its middle."""
     for x, y in ((48, 32), (40, 21), (60, 40)):
         found = engine.probe(ball(lens), x, y)
@@ -73,13 +70,13 @@ def test_a_point_of_the_ball(lens: dict[str, Any], engine: Engine) -> None:
         on_the_ball(found, x, y)
 
 
-def test_beside_the_ball_is_nothing(engine: Engine) -> None:
+def test_beside_the_ball_is_nothing(engine: clfractal.Engine) -> None:
     found = engine.probe(ball(), 1, 1)
     assert (found.hit, found.point, found.depth, found.distance) == (False, None, None, None)
     assert json.loads(json.dumps(found.plain()))["normal"] is None
 
 
-def test_films_tell_the_same(engine: Engine) -> None:
+def test_films_tell_the_same(engine: clfractal.Engine) -> None:
     """From their channels, or by a ray; in a part of the picture, too, and after pickling."""
     scene = ball()
     expected = engine.probe(scene, 40, 21)
@@ -96,10 +93,10 @@ def test_films_tell_the_same(engine: Engine) -> None:
         part.probe(40, 2.5)  # type: ignore[arg-type]
     assert part.probe(np.int64(40), np.int32(21)) == expected  # type: ignore[arg-type]
     with pytest.raises(clfractal.SceneError, match="only framebuffers that were rendered"):
-        Framebuffer().probe(0, 0)
+        clfractal.Framebuffer().probe(0, 0)
 
 
-def test_the_depth_makes_the_point_sharp(engine: Engine) -> None:
+def test_the_depth_makes_the_point_sharp(engine: clfractal.Engine) -> None:
     """A focus at that place of the picture has the number that the probe tells."""
     place = [40.5 / 96, 21.5 / 64]
     settled = engine.settled(ball({"f_number": 2, "focus_on": place}))
@@ -107,7 +104,7 @@ def test_the_depth_makes_the_point_sharp(engine: Engine) -> None:
     assert settled.camera.focus_distance == pytest.approx(depth, rel=1e-6)  # type: ignore[union-attr]
 
 
-def test_views_of_a_layout(engine: Engine) -> None:
+def test_views_of_a_layout(engine: clfractal.Engine) -> None:
     """Two views, side by side: the second sees the ball from the other side. Between them is nothing to ask."""
     behind = {**CAMERA, "position": [0, 3, 0]}
     scene = ball(layout={"views": [{}, {"camera": behind}], "gap": 4})
@@ -136,7 +133,7 @@ def test_views_of_a_layout(engine: Engine) -> None:
     ],
 )
 def test_pictures_of_two_eyes(
-    mode: str, pixel: tuple[int, int], eye: str, seen: tuple[int, int], engine: Engine
+    mode: str, pixel: tuple[int, int], eye: str, seen: tuple[int, int], engine: clfractal.Engine
 ) -> None:
     """Each pixel is one eye's; the point is on the ball, in the direction in which that eye's view shows the pixel."""
     job = engine.prepare(ball(stereo={**STEREO, "mode": mode}))
@@ -151,7 +148,7 @@ def test_pictures_of_two_eyes(
     assert found.distance == pytest.approx(float(np.linalg.norm(where - camera.origin)), abs=3e-3)
 
 
-def test_films_of_two_eyes(engine: Engine) -> None:
+def test_films_of_two_eyes(engine: clfractal.Engine) -> None:
     left, right = engine.render_pair(ball(stereo=STEREO), channels=CHANNELS)
     assert left.probe(48, 32).eye == "left"
     assert right.probe(48, 32).eye == "right"

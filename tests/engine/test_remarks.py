@@ -10,14 +10,10 @@ from typing import Any
 import numpy as np
 import pytest
 
+import clfractal
 from clfractal.cli.progress import Reporter
 from clfractal.device.select import Device
-from clfractal.engine.engine import Engine
-from clfractal.engine.run import Progress
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from tests.pictures import scene_paths, small_framebuffers
 from tests.render.shots import BALL, engine_of
 from tests.scenes import scene_of
@@ -31,11 +27,13 @@ VOLUME = {"type": "volume", "resolution": 16}
 
 
 @pytest.fixture
-def engine(device: Device) -> Engine:
+def engine(device: Device) -> clfractal.Engine:
     return engine_of(device)
 
 
-def of(engine: Engine, formula: Any = BALL, camera: Any = CAMERA, **sections: Any) -> tuple[str, ...]:
+def of(
+    engine: clfractal.Engine, formula: Any = BALL, camera: Any = CAMERA, **sections: Any
+) -> tuple[str, ...]:
     """The remarks on a whole picture."""
     scene = scene_of(formula, camera, SIZE, **sections)
     if scene.stereo is not None:
@@ -51,14 +49,14 @@ def one(remarks: tuple[str, ...], *parts: str) -> None:
     assert [part for part in parts if part not in line] == [], line
 
 
-def test_a_usual_picture_needs_no_remark(engine: Engine) -> None:
+def test_a_usual_picture_needs_no_remark(engine: clfractal.Engine) -> None:
     framebuffer = engine.render(scene_of(BALL, CAMERA, SIZE))
     assert framebuffer.remarks == ()
     assert framebuffer.stats["remarks"] == []
-    assert Framebuffer().remarks == ()
+    assert clfractal.Framebuffer().remarks == ()
 
 
-def test_a_key_without_an_effect(engine: Engine) -> None:
+def test_a_key_without_an_effect(engine: clfractal.Engine) -> None:
     formula = {"name": "mandelbulb", "iterations": 3}
     assert of(engine, formula) == ()
     one(of(engine, {**formula, "live": ["power"]}), "formula.live has no effect")
@@ -73,7 +71,7 @@ def test_shipped_scenes_need_none(name: str) -> None:
     )
 
 
-def test_no_ray_meets_the_set(engine: Engine) -> None:
+def test_no_ray_meets_the_set(engine: clfractal.Engine) -> None:
     bounds = "a ball of radius 1.5 around [0, 0, 0], are not in the picture: turn camera.target"
     one(of(engine, camera=AWAY), "no ray meets the set", bounds)
     one(of(engine, camera=AWAY, background="transparent"), "the set, so alpha is 0 everywhere;", bounds)
@@ -87,13 +85,13 @@ def test_no_ray_meets_the_set(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("channels", [["R", "G", "B"], ["Z"]])
-def test_channels_are_not_needed(channels: list[str], engine: Engine) -> None:
+def test_channels_are_not_needed(channels: list[str], engine: clfractal.Engine) -> None:
     scene = scene_of(BALL, AWAY, SIZE)
     one(engine.render(scene, channels=channels).remarks, "no ray meets the set")
     assert engine.render(scene_of(BALL, CAMERA, SIZE), channels=channels).remarks == ()
 
 
-def test_a_region_may_show_only_background(engine: Engine) -> None:
+def test_a_region_may_show_only_background(engine: clfractal.Engine) -> None:
     """But not if the whole picture misses the set."""
     corner = (0, 0, 8, 8)
     framebuffer = engine.render(scene_of(BALL, CAMERA, SIZE), region=corner)
@@ -102,12 +100,12 @@ def test_a_region_may_show_only_background(engine: Engine) -> None:
     one(engine.render(scene_of(BALL, AWAY, SIZE), region=corner).remarks, "no ray meets the set")
 
 
-def test_a_view_of_a_layout_is_named(engine: Engine) -> None:
+def test_a_view_of_a_layout_is_named(engine: clfractal.Engine) -> None:
     remarks = of(engine, layout={"views": [{}, {"camera": AWAY}]})
     one(remarks, "layout.views.1: no ray meets the set")
 
 
-def test_the_camera_is_inside(engine: Engine) -> None:
+def test_the_camera_is_inside(engine: clfractal.Engine) -> None:
     inside = {"position": [0, -0.2, 0], "target": [0, 0, 0]}
     one(of(engine, camera=inside), "the camera is inside the set; move camera.position")
     # Where a plane has removed the set around it, it may be there.
@@ -121,12 +119,12 @@ def test_the_camera_is_inside(engine: Engine) -> None:
 STILL = {**BALL, "map": ["0.5*x", "0.5*y", "0.5*z"], "degree": 1}
 
 
-def test_a_formula_that_never_escapes(engine: Engine) -> None:
+def test_a_formula_that_never_escapes(engine: clfractal.Engine) -> None:
     one(of(engine, STILL), "never escapes", "plain ball", "formula.bailout")
     one(of(engine, STILL, renderer=VOLUME), "never escapes", "plain box")
 
 
-def test_steps_that_end_inside(engine: Engine) -> None:
+def test_steps_that_end_inside(engine: clfractal.Engine) -> None:
     """Of a derivative that is told to grow too slowly, distances are six times too long; smaller steps mend it."""
     bold = {**BALL, "derivative": "1.6*sqrt(x*x + y*y + z*z)*dr"}
     rough = {"type": "surface", "step_scale": 1.0}
@@ -135,7 +133,7 @@ def test_steps_that_end_inside(engine: Engine) -> None:
     assert of(engine, bold, renderer={**rough, "step_scale": 0.1}) == ()
 
 
-def test_steps_that_are_too_few(engine: Engine) -> None:
+def test_steps_that_are_too_few(engine: clfractal.Engine) -> None:
     def limited(steps: int, **more: Any) -> tuple[str, ...]:
         return of(engine, renderer={"type": "surface", "max_steps": steps}, **more)
 
@@ -145,7 +143,7 @@ def test_steps_that_are_too_few(engine: Engine) -> None:
     assert limited(60) == ()
 
 
-def test_volumes_that_show_nothing(engine: Engine, tmp_path: Path) -> None:
+def test_volumes_that_show_nothing(engine: clfractal.Engine, tmp_path: Path) -> None:
     beyond = {**VOLUME, "box": {"center": [5, 0, 0], "size": 2}}
     one(
         of(engine, renderer=beyond),
@@ -164,7 +162,7 @@ def test_volumes_that_show_nothing(engine: Engine, tmp_path: Path) -> None:
         BALL, {"position": [3, -4, 9], "target": [3, -4, 0], "up": [0, 1, 0], "fov": 30}, SIZE
     ).resolved()
     plain["renderer"] = {"type": "volume", "file": "bar.nrrd"}
-    beside: Scene = load_scene(plain, folder=tmp_path)
+    beside: clfractal.Scene = clfractal.load_scene(plain, folder=tmp_path)
     one(engine.render(beside).remarks, "its box is not in the picture: turn camera.target to [-0.2")
     clear = {**VOLUME, "transfer": {"opacity": [{"at": 0, "opacity": 0}, {"at": 1, "opacity": 0}]}}
     hidden = of(engine, renderer=clear, background="transparent")
@@ -175,11 +173,11 @@ def test_volumes_that_show_nothing(engine: Engine, tmp_path: Path) -> None:
     np.save(tmp_path / "lost.npy", np.full((8, 8, 8), np.nan, np.float32))
     plain = scene_of(BALL, CAMERA, SIZE).resolved()
     plain["renderer"] = {"type": "volume", "file": "lost.npy"}
-    lost: Scene = load_scene(plain, folder=tmp_path)
+    lost: clfractal.Scene = clfractal.load_scene(plain, folder=tmp_path)
     one(engine.render(lost).remarks, "the volume holds nothing but NaN; renderer.file")
 
 
-def test_planes_of_one_color(engine: Engine) -> None:
+def test_planes_of_one_color(engine: clfractal.Engine) -> None:
     """A plane within the ball, and one far from it."""
 
     def plane(**place: Any) -> dict[str, Any]:
@@ -191,18 +189,18 @@ def test_planes_of_one_color(engine: Engine) -> None:
     assert of(engine, renderer=plane(width=4, height=4)) == ()
 
 
-def test_a_plane_that_is_too_large(engine: Engine) -> None:
+def test_a_plane_that_is_too_large(engine: clfractal.Engine) -> None:
     """Its middle is inside the set, which is less than a pixel of it."""
-    scene = load_scene(
+    scene = clfractal.load_scene(
         "version: 1\nformula: {name: mandelbulb, iterations: 60}\nimage: {width: 200, height: 200}\ncamera: {}\n"
         "renderer: {type: cut_plane, plane: {width: 1e+6, height: 1e+6}}\n"
     )
     one(engine.render(scene).remarks, "the plane of 1e+06 x 1e+06 is so large", "a smaller renderer.plane")
 
 
-def test_a_picture_made_again_has_the_same_remarks(engine: Engine, tmp_path: Path) -> None:
+def test_a_picture_made_again_has_the_same_remarks(engine: clfractal.Engine, tmp_path: Path) -> None:
     """Its header holds every key, also those that nobody wrote; only what differs from the default would be missed."""
-    scene = load_scene(
+    scene = clfractal.load_scene(
         "version: 1\nformula: {name: hast, iterations: 3}\nimage: {width: 32, height: 24}\n"
         "camera: {position: [1.7, -2.9, 1.4]}\nlighting: {mode: path}\nlights: []\nbackground: [1, 1, 1]\n"
         "materials: {m: {base: {color: [1, 1, 1]}}}\nmaterial: {name: m}\nrenderer: {samples: 4}\n"
@@ -216,7 +214,7 @@ def test_a_picture_made_again_has_the_same_remarks(engine: Engine, tmp_path: Pat
         one(engine.render(source).remarks, "lighting.mode path does not use material.shininess")
 
 
-def test_refined_pictures_have_them_at_the_end(engine: Engine) -> None:
+def test_refined_pictures_have_them_at_the_end(engine: clfractal.Engine) -> None:
     adaptive = {"type": "surface", "samples": 8, "noise": 1.0, "min_samples": 4}
     framebuffers = list(engine.refine(scene_of(BALL, CAMERA, SIZE, renderer=adaptive)))
     assert framebuffers[-1].remarks == ()
@@ -224,7 +222,7 @@ def test_refined_pictures_have_them_at_the_end(engine: Engine) -> None:
     one(framebuffers[-1].remarks, "no ray meets the set")
 
 
-def test_they_travel_with_the_film(engine: Engine) -> None:
+def test_they_travel_with_the_film(engine: clfractal.Engine) -> None:
     framebuffer = engine.render(scene_of(BALL, AWAY, SIZE))
     assert pickle.loads(pickle.dumps(framebuffer)).remarks == framebuffer.remarks != ()
 
@@ -278,7 +276,7 @@ def test_a_resumed_picture_is_looked_at_as_a_whole(
     assert remarks == []
 
 
-def _interrupted(reporter: Reporter, state: Progress) -> None:
+def _interrupted(reporter: Reporter, state: clfractal.Progress) -> None:
     """The first tiles, in the picture's middle, are done."""
     if state.tiles_done:
         raise KeyboardInterrupt

@@ -11,11 +11,7 @@ import pytest
 import clfractal
 from clfractal.camera.views import seen_by
 from clfractal.device.select import Device
-from clfractal.engine.engine import Engine
 from clfractal.engine.settle import HIGHLIGHT, exposure_of, is_settled
-from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of
 from tests.scenes import scene_of
@@ -26,23 +22,23 @@ STEREO = "stereo={screen_width: 0.6, screen_distance: 0.7}"
 
 
 @pytest.fixture
-def engine(device: Device) -> Engine:
+def engine(device: Device) -> clfractal.Engine:
     return engine_of(device)
 
 
-def ball(*overrides: str, **camera: Any) -> Scene:
+def ball(*overrides: str, **camera: Any) -> clfractal.Scene:
     scene = scene_of(BALL, {**CAMERA, **camera}, SIZE, renderer={"detail": 0.02})
-    return load_scene(scene.resolved(), overrides=overrides)
+    return clfractal.load_scene(scene.resolved(), overrides=overrides)
 
 
-def focus_of(scene: Scene) -> float:
+def focus_of(scene: clfractal.Scene) -> float:
     assert isinstance(scene.camera, PerspectiveCamera)
     assert scene.camera.measured_focus is None
     assert scene.camera.focus_distance is not None
     return scene.camera.focus_distance
 
 
-def test_the_middle_is_sharp(engine: Engine) -> None:
+def test_the_middle_is_sharp(engine: clfractal.Engine) -> None:
     """The ray through the middle of the pixel right below the picture's middle meets the ball at a known depth."""
     found = engine.settled(ball(focus="auto"))
     assert focus_of(found) == pytest.approx(3 - BALL_RADIUS, abs=1e-3)
@@ -51,7 +47,7 @@ def test_the_middle_is_sharp(engine: Engine) -> None:
 
 
 @pytest.mark.parametrize("place", [(0.4, 0.45), (0.62, 0.6)])
-def test_a_place_of_the_picture_is_sharp(place: tuple[float, float], engine: Engine) -> None:
+def test_a_place_of_the_picture_is_sharp(place: tuple[float, float], engine: clfractal.Engine) -> None:
     found = focus_of(engine.settled(ball(focus_on=place)))
     # The ray through that pixel's middle, met with the sphere.
     column, row = (int(part * side) for part, side in zip(place, SIZE, strict=True))
@@ -65,13 +61,13 @@ def test_a_place_of_the_picture_is_sharp(place: tuple[float, float], engine: Eng
     assert depth > 3 - BALL_RADIUS + 0.02
 
 
-def test_beside_the_ball_its_nearest_rim_is_sharp(engine: Engine) -> None:
+def test_beside_the_ball_its_nearest_rim_is_sharp(engine: clfractal.Engine) -> None:
     """Nothing lies in that corner; the rim of a sphere at distance 3 is at the depth 3 - radius^2 / 3."""
     found = focus_of(engine.settled(ball(focus_on=(0.99, 0.02))))
     assert found == pytest.approx(3 - BALL_RADIUS**2 / 3, abs=0.15)
 
 
-def test_an_empty_picture_keeps_the_defaults(engine: Engine) -> None:
+def test_an_empty_picture_keeps_the_defaults(engine: clfractal.Engine) -> None:
     found = engine.settled(ball("output.exposure=auto", focus="auto", target=[0, -6, 0]))
     assert found.camera.measured_focus is None  # type: ignore[union-attr]
     assert found.camera.focus_distance is None  # type: ignore[union-attr]
@@ -89,7 +85,7 @@ def test_focus_and_distance_contradict() -> None:
     assert str(caught.value).endswith(message)
 
 
-def test_views_of_a_layout_have_their_own_focus(engine: Engine) -> None:
+def test_views_of_a_layout_have_their_own_focus(engine: clfractal.Engine) -> None:
     """One with the scene's camera, one with its own, nearer."""
     own = "{position: [0, -2, 0], f_number: 1, focus: auto}"
     scene = ball(f"layout={{views: [{{}}, {{camera: {own}}}]}}", focus="auto")
@@ -101,7 +97,7 @@ def test_views_of_a_layout_have_their_own_focus(engine: Engine) -> None:
     assert camera.focus_distance == pytest.approx(2 - BALL_RADIUS, abs=2e-3)
 
 
-def test_a_lens_in_stereo_focuses_on_the_screen(engine: Engine) -> None:
+def test_a_lens_in_stereo_focuses_on_the_screen(engine: clfractal.Engine) -> None:
     """Unless the camera says otherwise: the plane through the target, at 3 times 0.7 / 0.6 of what it is wide."""
     scene = ball(STEREO)
     job = engine.prepare(scene)
@@ -109,13 +105,13 @@ def test_a_lens_in_stereo_focuses_on_the_screen(engine: Engine) -> None:
     screen = wide * 0.7 / 0.6
     assert [view.camera.focus_distance for view in job.views] == pytest.approx([screen, screen])
     plane = "{center: [0, -0.5, 0], normal: [0, -1, 0], width: 2}"
-    job = engine.prepare(load_scene(scene.resolved(), overrides=[f"stereo.plane={plane}"]))
+    job = engine.prepare(clfractal.load_scene(scene.resolved(), overrides=[f"stereo.plane={plane}"]))
     assert [view.camera.focus_distance for view in job.views] == pytest.approx([2 * 0.7 / 0.6] * 2)
     job = engine.prepare(ball(STEREO, focus_distance=1.25))
     assert [view.camera.focus_distance for view in job.views] == [1.25, 1.25]
 
 
-def test_both_eyes_have_the_focus_of_the_eye_between_them(engine: Engine) -> None:
+def test_both_eyes_have_the_focus_of_the_eye_between_them(engine: clfractal.Engine) -> None:
     scene = ball(STEREO, focus="auto")
     job = engine.prepare(scene)
     wide = 2 * 3 * math.tan(math.radians(25)) * SIZE[0] / SIZE[1]
@@ -125,22 +121,22 @@ def test_both_eyes_have_the_focus_of_the_eye_between_them(engine: Engine) -> Non
     assert engine.preview.depth(seen, (0.5, 0.5), eye) != job.views[0].camera.focus_distance
 
 
-def test_regions_and_headers_give_the_same_bits(engine: Engine) -> None:
+def test_regions_and_headers_give_the_same_bits(engine: clfractal.Engine) -> None:
     """Of the scene, of a part of it, and of the scene in the picture's header, which has numbers."""
     scene = ball("output.exposure=auto", focus_on=[0.4, 0.4])
     framebuffer = engine.render(scene, samples=2)
     part = engine.render(scene, samples=2, region=(30, 20, 20, 10))
-    again = engine.render(load_scene(framebuffer.header["scene"]), samples=2)
+    again = engine.render(clfractal.load_scene(framebuffer.header["scene"]), samples=2)
     for name in "RGBZ":
         np.testing.assert_array_equal(part[name], framebuffer[name][20:30, 30:50])
         np.testing.assert_array_equal(again[name], framebuffer[name])
-    header = load_scene(framebuffer.header["scene"])
+    header = clfractal.load_scene(framebuffer.header["scene"])
     assert is_settled(header)
     assert header.output.exposure == framebuffer.header["exposure"] == part.header["exposure"]
     assert again.header["scene"] == framebuffer.header["scene"]
 
 
-def lit(intensity: float, **sections: Any) -> Scene:
+def lit(intensity: float, **sections: Any) -> clfractal.Scene:
     """A white sphere and a box in the light of the viewer's own lamp; the background must not count."""
     lights = [{"direction": [0, 1, 0], "intensity": intensity, "shadow": False}]
     return scene_of(
@@ -154,12 +150,12 @@ def lit(intensity: float, **sections: Any) -> Scene:
     )
 
 
-def test_twice_the_light_needs_a_stop_less(engine: Engine) -> None:
+def test_twice_the_light_needs_a_stop_less(engine: clfractal.Engine) -> None:
     one, four = (engine.settled(lit(intensity)).output.stops for intensity in (1, 4))
     assert one - four == pytest.approx(2, abs=0.02)
 
 
-def test_the_brightest_hundredth_begins_near_white(engine: Engine) -> None:
+def test_the_brightest_hundredth_begins_near_white(engine: clfractal.Engine) -> None:
     framebuffer = engine.render(lit(0.3))
     seen = framebuffer["A"] > 0.5
     assert seen.mean() > 0.05
@@ -168,10 +164,10 @@ def test_the_brightest_hundredth_begins_near_white(engine: Engine) -> None:
     assert float(np.quantile(shown, 0.99)) == pytest.approx(HIGHLIGHT, rel=0.03)
 
 
-def framebuffer_of(bright: Any) -> Framebuffer:
+def framebuffer_of(bright: Any) -> clfractal.Framebuffer:
     """A framebuffer of one row, grey, wholly covered."""
     row = np.asarray(bright, np.float32)[None]
-    framebuffer = Framebuffer("RGBA", (row.shape[1], 1))
+    framebuffer = clfractal.Framebuffer("RGBA", (row.shape[1], 1))
     framebuffer.fill({"R": row, "G": row, "B": row, "A": np.ones_like(row)})
     return framebuffer
 

@@ -17,20 +17,15 @@ from hypothesis import strategies as st
 
 import clfractal
 from clfractal.device import program
-from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, by_key, devices, is_simulator
 from clfractal.engine import several, sharing
-from clfractal.engine.engine import Engine
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Result, WorkItem
 from clfractal.engine.several import SeveralExecutor
 from clfractal.engine.sharing import Shared
-from clfractal.errors import DeviceError, Stopped
-from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators import lanes
 from clfractal.integrators.lanes import march_reports
-from clfractal.scene.load import load_scene
 from tests.calls import counted
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
@@ -46,16 +41,18 @@ class Failing(LocalExecutor):
     after = 0
 
     def execute(
-        self, job: Job, items: Iterable[WorkItem], token: CancelToken | None = None
+        self, job: Job, items: Iterable[WorkItem], token: clfractal.CancelToken | None = None
     ) -> Generator[Result]:
         for result in super().execute(job, items, token):
             self.after -= len(result.tiles)
             yield result
             if self.after <= 0 and len(result.tiles):
-                raise DeviceError(f"{self.device.info.name}: the device failed while rendering: OUT_OF_ORDER")
+                raise clfractal.DeviceError(
+                    f"{self.device.info.name}: the device failed while rendering: OUT_OF_ORDER"
+                )
 
 
-def failing(engine: Engine, which: Sequence[int], after: int) -> SeveralExecutor:
+def failing(engine: clfractal.Engine, which: Sequence[int], after: int) -> SeveralExecutor:
     """Gives an engine devices of which some fail after so many tiles."""
     shared = engine.executor
     assert isinstance(shared, SeveralExecutor)
@@ -68,13 +65,13 @@ def failing(engine: Engine, which: Sequence[int], after: int) -> SeveralExecutor
 
 
 @pytest.fixture(scope="module")
-def whole(device: Device) -> Framebuffer:
-    with Engine(device) as engine:
+def whole(device: Device) -> clfractal.Framebuffer:
+    with clfractal.Engine(device) as engine:
         return engine.render(SCENE)
 
 
-def test_halves_give_the_bits_of_the_whole(device: Device, whole: Framebuffer) -> None:
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+def test_halves_give_the_bits_of_the_whole(device: Device, whole: clfractal.Framebuffer) -> None:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         assert same(engine.render(SCENE), whole)
         framebuffer = engine.render(SCENE)
     assert same(framebuffer, whole)
@@ -94,7 +91,7 @@ def test_halves_give_the_bits_of_the_whole(device: Device, whole: Framebuffer) -
     assert all(f": {counts[int(line[0])]} tiles" in line for line in lines)
 
 
-def test_one_device_tells_of_no_others(whole: Framebuffer) -> None:
+def test_one_device_tells_of_no_others(whole: clfractal.Framebuffer) -> None:
     assert not {"devices", "tileDevices"} & set(whole.header)
     assert "devices" not in whole.stats
 
@@ -112,7 +109,7 @@ layout:
   - renderer: {type: volume, resolution: 24}
   - renderer: {type: cut_plane, plane: {width: 2.5, height: 2.5}, samples: 2}
 """
-    with Engine(device) as one, Engine(halves_of(device), budget_seconds=0.01) as two:
+    with clfractal.Engine(device) as one, clfractal.Engine(halves_of(device), budget_seconds=0.01) as two:
         alone, first, second = one.render(scene), two.render(scene), two.render(scene)
     assert same(first, alone)
     assert same(second, alone)
@@ -122,7 +119,7 @@ layout:
 def test_a_stereo_pair(device: Device) -> None:
     stereo = SCENE.replace("width: 300, height: 200", "width: 130, height: 100")
     stereo += "stereo: {mode: anaglyph, separation: 0.1}\n"
-    with Engine(device) as one, Engine(halves_of(device), budget_seconds=0.01) as two:
+    with clfractal.Engine(device) as one, clfractal.Engine(halves_of(device), budget_seconds=0.01) as two:
         framebuffer = two.render(stereo)
         assert same(framebuffer, one.render(stereo))
     assert (
@@ -132,9 +129,9 @@ def test_a_stereo_pair(device: Device) -> None:
 
 
 @pytest.mark.parametrize("after", [1, 20])
-def test_a_device_that_fails_is_left_out(device: Device, whole: Framebuffer, after: int) -> None:
+def test_a_device_that_fails_is_left_out(device: Device, whole: clfractal.Framebuffer, after: int) -> None:
     said: list[str] = []
-    with Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01, tell=said.append) as engine:
         shared = failing(engine, [0], after)
         framebuffer = engine.render(SCENE)
         assert same(framebuffer, whole)
@@ -150,36 +147,36 @@ def test_a_device_that_fails_is_left_out(device: Device, whole: Framebuffer, aft
 
 
 def test_no_device_is_left(device: Device) -> None:
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         failing(engine, [0, 1], 10)
-        with pytest.raises(DeviceError, match=r"no device is left: .*OUT_OF_ORDER") as caught:
+        with pytest.raises(clfractal.DeviceError, match=r"no device is left: .*OUT_OF_ORDER") as caught:
             engine.render(SCENE)
         assert caught.value.status == 3
-        with pytest.raises(DeviceError, match="no device is left"):
+        with pytest.raises(clfractal.DeviceError, match="no device is left"):
             engine.render(SCENE)
 
 
 def test_a_device_that_does_not_work_at_all(
-    device: Device, whole: Framebuffer, monkeypatch: pytest.MonkeyPatch
+    device: Device, whole: clfractal.Framebuffer, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """It fails where decisions are made, before anything is rendered."""
     real = lanes.best_lanes
 
     def best_lanes(chosen: Device, *rest: object, **more: object) -> int:
         if chosen.info.index.endswith("#1"):
-            raise DeviceError(f"{chosen.info.name}: no kernel works on this device")
+            raise clfractal.DeviceError(f"{chosen.info.name}: no kernel works on this device")
         return real(chosen, *rest, **more)  # type: ignore[arg-type]
 
     monkeypatch.setattr("clfractal.engine.prepare.best_lanes", best_lanes)
-    with Engine(halves_of(device)) as engine:
+    with clfractal.Engine(halves_of(device)) as engine:
         assert same(engine.render(SCENE), whole)
         assert engine.device.info.index.endswith("#2")
 
 
 @pytest.mark.parametrize("after", [10_000, 75, 150])
-def test_passes_stay_on_their_device(device: Device, whole: Framebuffer, after: int) -> None:
+def test_passes_stay_on_their_device(device: Device, whole: clfractal.Framebuffer, after: int) -> None:
     """Samples are added on the device that has the earlier ones; with it they are lost, and the tile begins again."""
-    with Engine(halves_of(device), budget_seconds=0.01) as engine:
+    with clfractal.Engine(halves_of(device), budget_seconds=0.01) as engine:
         failing(engine, [1], after)
         framebuffers = list(engine.refine(SCENE))
         assert same(framebuffers[-1], whole)
@@ -192,7 +189,7 @@ def test_devices_of_another_kind_use_their_own_lanes(device: Device, monkeypatch
     parts = device.divided((1, 1))
     other = Device(replace(parts[1].info, driver="of another version"), parts[1].cl_device)
     monkeypatch.setattr(several, "lanes_of", lambda views, chosen, **more: (4,) * len(views))
-    with Engine([parts[0], other]) as engine:
+    with clfractal.Engine([parts[0], other]) as engine:
         job = engine.prepare(SCENE)
     assert job.on(parts[0].info) is job
     assert job.on(replace(other.info, driver="unknown")) is None
@@ -208,17 +205,17 @@ def test_two_implementations(device: Device) -> None:
     """Of two drivers for the processor each makes a part of the picture, within what they differ by."""
     kinds: dict[str, str] = {}
     for info in devices():
-        with suppress(DeviceError):
+        with suppress(clfractal.DeviceError):
             if info.kind == "cpu" and not is_simulator(info):
                 march_reports(by_key(info.index, info.key), "float32")
                 kinds.setdefault(info.key, info.index)
     if len(kinds) < 2:
         pytest.skip("two drivers of the processor that work are needed")
     names = list(kinds.values())[:2]
-    scene = load_scene(SCENE, overrides=["renderer.samples=64"])
-    with Engine(names[0]) as one:
+    scene = clfractal.load_scene(SCENE, overrides=["renderer.samples=64"])
+    with clfractal.Engine(names[0]) as one:
         alone = one.render(scene)
-    with Engine(names, budget_seconds=0.01) as both:
+    with clfractal.Engine(names, budget_seconds=0.01) as both:
         for _ in range(5):  # a short picture does not wait for the programs of the second
             framebuffer = both.render(scene)
             if len(framebuffer.stats["devices"]) == 2:
@@ -230,12 +227,12 @@ def test_two_implementations(device: Device) -> None:
     assert not difference(pictures[0], pictures[1], "float32").fault
 
 
-def test_float64_is_left_to_those_that_have_it(device: Device, whole: Framebuffer) -> None:
+def test_float64_is_left_to_those_that_have_it(device: Device, whole: clfractal.Framebuffer) -> None:
     halves_of(device)
     parts = device.divided((1, 1))
     lacking = Device(replace(parts[0].info, driver="without", has_float64=False), parts[0].cl_device)
     said: list[str] = []
-    with Engine([lacking, parts[1]], tell=said.append) as engine:
+    with clfractal.Engine([lacking, parts[1]], tell=said.append) as engine:
         assert engine.device is parts[1]
         framebuffer = engine.render(SCENE, precision="float64", samples=1)
     assert [each["index"] for each in framebuffer.stats["devices"]] == [parts[1].info.index]
@@ -243,16 +240,16 @@ def test_float64_is_left_to_those_that_have_it(device: Device, whole: Framebuffe
 
 
 def test_a_token_ends_all_devices(device: Device) -> None:
-    token = CancelToken()
-    heavy = load_scene(SCENE, overrides=["renderer.samples=4000"])
+    token = clfractal.CancelToken()
+    heavy = clfractal.load_scene(SCENE, overrides=["renderer.samples=4000"])
     before = set(threading.enumerate())
-    with Engine(halves_of(device)) as engine:
+    with clfractal.Engine(halves_of(device)) as engine:
         engine.render(SCENE)
 
         def progress(state: object) -> None:
             token.cancel()
 
-        with pytest.raises(Stopped):
+        with pytest.raises(clfractal.Stopped):
             engine.render(heavy, progress, token=token)
         left = [each for each in threading.enumerate() if each not in before]
         assert not [each for each in left if each.name.startswith("clfractal-0")]
@@ -261,8 +258,8 @@ def test_a_token_ends_all_devices(device: Device) -> None:
 
 def test_wrong_lists_of_devices(device: Device) -> None:
     for wrong in ([], [3], [None], 3):
-        with pytest.raises(DeviceError) as caught:
-            Engine(wrong)  # type: ignore[arg-type]
+        with pytest.raises(clfractal.DeviceError) as caught:
+            clfractal.Engine(wrong)  # type: ignore[arg-type]
         assert caught.value.status == 2
 
 
@@ -273,7 +270,7 @@ def test_a_program_is_compiled_once_for_devices_of_one_kind(
     monkeypatch.setenv("CLFRACTAL_LANES", "8")
     compiled = counted(monkeypatch, program, "_compile_in_child")
     scene = SCENE.replace("300, height: 200", "3000, height: 2000").replace("iterations: 8", "iterations: 9")
-    with Engine(halves_of(device)) as engine:
+    with clfractal.Engine(halves_of(device)) as engine:
         for executor in engine.executor.executors:  # type: ignore[union-attr]
             executor.device.loaded.clear()
         framebuffer = engine.render(scene, samples=1)
@@ -285,10 +282,10 @@ def test_pictures_whose_samples_differ_are_shared(device: Device) -> None:
     """With motion blur a device makes all samples of some tiles, and leaves others to the other one."""
     tracks = {"lights.0.intensity": {"expression": "1 + frame"}}
     moving = {"frames": 4, "shutter": 0.5, "tracks": tracks}
-    scene = clfractal.at_frame(load_scene(SCENE).model_copy(update={"animation": moving}), 1)
-    with Engine(device) as one:
+    scene = clfractal.at_frame(clfractal.load_scene(SCENE).model_copy(update={"animation": moving}), 1)
+    with clfractal.Engine(device) as one:
         alone = one.render(scene, samples=4)
-    with Engine(halves_of(device)) as both:
+    with clfractal.Engine(halves_of(device)) as both:
         both.render(scene, samples=4)
         framebuffer = both.render(scene, samples=4)
     assert len(framebuffer.stats["devices"]) == 2

@@ -13,8 +13,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import clfractal
 from clfractal.device.select import Device
-from clfractal.engine.engine import Engine
 from clfractal.engine.variations import (
     KINDS,
     PREVIEW_SIZE,
@@ -27,13 +27,9 @@ from clfractal.engine.variations import (
 from clfractal.engine.varied import AMOUNT, Kind, Strength, is_locked, rounded
 from clfractal.engine.vary_colors import Grade
 from clfractal.engine.vary_formula import expanded, moved_value, shown_parameters, slots
-from clfractal.errors import SceneError
 from clfractal.formulas import catalog
 from clfractal.formulas.definition import Parameter
 from clfractal.formulas.opencl import write_formula
-from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.load import dump_scene, load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.palettes import from_oklab, to_oklab
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.schema.base import cross, length, minus
@@ -41,7 +37,7 @@ from tests.scenes import scene_of
 from tests.variants import every
 
 SCENES = sorted((Path(__file__).parents[2] / "scenes").glob("*.yaml"))
-BULB = load_scene("""version: 1
+BULB = clfractal.load_scene("""version: 1
 formula: {name: mandelbulb, parameters: {power: 8, theta_phase: 0.2}, julia: [0.3, 0.2, -0.4], iterations: 8}
 image: {width: 48, height: 32}
 camera: {position: [1.6, -2.2, 1.0], fov: 48}
@@ -97,7 +93,7 @@ def leaves(value: Any, path: str = "") -> Iterator[tuple[str, Any]]:
         yield path, value
 
 
-def different(one: Scene, other: Scene) -> set[str]:
+def different(one: clfractal.Scene, other: clfractal.Scene) -> set[str]:
     """Dotted paths of the numbers and words in which two scenes differ."""
     first, second = dict(leaves(one.resolved())), dict(leaves(other.resolved()))
     return {path for path in {*first, *second} if first.get(path) != second.get(path)}
@@ -105,13 +101,13 @@ def different(one: Scene, other: Scene) -> set[str]:
 
 def check_twelve(path: Path, strength: Strength) -> None:
     """That there are as many, valid and different."""
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     found = variations(scene, strength=strength)
     assert len(found) == 12
-    texts = [dump_scene(each.scene) for each in found]
-    assert len({*texts, dump_scene(scene)}) == 13
+    texts = [clfractal.dump_scene(each.scene) for each in found]
+    assert len({*texts, clfractal.dump_scene(scene)}) == 13
     for each, text in zip(found, texts, strict=True):
-        assert load_scene(text, folder=scene.folder) == each.scene
+        assert clfractal.load_scene(text, folder=scene.folder) == each.scene
         assert each.remark
         assert "\n" not in each.remark
 
@@ -134,7 +130,7 @@ def test_every_shipped_scene_has_them_at_every_strength(strength: Strength) -> N
 
 @pytest.mark.parametrize("path", every(3, SCENES), ids=lambda path: str(path.stem))
 def test_nothing_that_tunes_the_search_changes(path: Path) -> None:
-    scene = load_scene(path)
+    scene = clfractal.load_scene(path)
     for each in variations(scene, strength="heavy", seed=3):
         found = different(expanded(scene), each.scene)
         assert found
@@ -169,7 +165,7 @@ def test_another_seed_gives_others() -> None:
     assert not {repr(each.changes) for each in first} & {repr(each.changes) for each in second}
 
 
-def formula_size(scene: Scene, before: Scene) -> float:
+def formula_size(scene: clfractal.Scene, before: clfractal.Scene) -> float:
     """The change of parameters, as parts of their ranges, and of the constant."""
     total = 0.0
     for slot, old in zip(slots(scene), slots(before), strict=True):
@@ -180,11 +176,11 @@ def formula_size(scene: Scene, before: Scene) -> float:
     return total
 
 
-def camera_size(scene: Scene, before: Scene) -> float:
+def camera_size(scene: clfractal.Scene, before: clfractal.Scene) -> float:
     return math.dist(scene.camera.position, before.camera.position)
 
 
-def colors_size(scene: Scene, before: Scene) -> float:
+def colors_size(scene: clfractal.Scene, before: clfractal.Scene) -> float:
     """How far the lights' colours are apart in Oklab, and how far their directions."""
     total = 0.0
     for light, old in zip(scene.lights, before.lights, strict=True):
@@ -224,19 +220,21 @@ def test_what_is_locked_stays() -> None:
         assert each.scene.formula.parameters["power"] == 8
         assert each.scene.lights == BULB.lights
         assert each.scene.coloring.palette == "hearth"
-    with pytest.raises(SceneError, match="nothing can be varied"):
+    with pytest.raises(clfractal.SceneError, match="nothing can be varied"):
         variations(BULB, locked=["formula", "camera", "coloring", "lights", "background", "material"])
 
 
 def test_a_set_without_numbers_has_no_variations_of_its_formula() -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "makin_brot"}, "camera": {}})
-    with pytest.raises(SceneError, match="nothing can be varied: the scene has no formula"):
+    scene = clfractal.load_scene({"version": 1, "formula": {"name": "makin_brot"}, "camera": {}})
+    with pytest.raises(clfractal.SceneError, match="nothing can be varied: the scene has no formula"):
         variations(scene, kinds=["formula"])
     assert len(variations(scene)) == 12
 
 
 def test_few_choices_are_all_found_and_then_it_ends() -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "hast"}, "camera": {"position": [0, -4, 0]}})
+    scene = clfractal.load_scene(
+        {"version": 1, "formula": {"name": "hast"}, "camera": {"position": [0, -4, 0]}}
+    )
     found = variations(scene, kinds=["formula"], strength="heavy")
     assert sorted(each.scene.formula.parameters["power"] for each in found) == [4, 8]
 
@@ -252,7 +250,9 @@ def test_whole_powers_and_whole_numbers_stay_whole() -> None:
     ("name", "power"), [("quaternion_julia", "power"), ("hast", "power"), ("polyhedral_ifs", "order")]
 )
 def test_slight_ones_keep_a_number_whose_next_value_is_far(name: str, power: str) -> None:
-    scene = load_scene({"version": 1, "formula": {"name": name}, "camera": {"position": [0, -4, 0]}})
+    scene = clfractal.load_scene(
+        {"version": 1, "formula": {"name": name}, "camera": {"position": [0, -4, 0]}}
+    )
     for each in variations(scene, count=40, strength="slight"):
         assert power not in each.scene.formula.parameters
     heavy = variations(scene, count=40, strength="heavy")
@@ -260,7 +260,7 @@ def test_slight_ones_keep_a_number_whose_next_value_is_far(name: str, power: str
 
 
 def test_a_chain_of_the_library_is_written_out_with_its_picture() -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "bulbox", "iterations": 6}, "camera": {}})
+    scene = clfractal.load_scene({"version": 1, "formula": {"name": "bulbox", "iterations": 6}, "camera": {}})
     assert expanded(scene).chain == scene.chain
     changes = [name for each in variations(scene, kinds=["formula"]) for name in each.changes]
     assert {"formula.inline.chain.0.parameters.power", "formula.inline.chain.1.parameters.scale"} <= {
@@ -286,7 +286,9 @@ def test_a_parameter_of_bounds_alone_is_a_setting_of_the_search() -> None:
         "bailout": 4,
         "step_scale": "where(care > 0, 0.5, 1)",
     }
-    scene = load_scene({"version": 1, "formula": {"inline": inline}, "camera": {"position": [0, -9, 0]}})
+    scene = clfractal.load_scene(
+        {"version": 1, "formula": {"inline": inline}, "camera": {"position": [0, -9, 0]}}
+    )
     assert [parameter.name for parameter in shown_parameters(slots(scene)[0].bound.formula)] == ["turn"]
 
 
@@ -375,7 +377,7 @@ def test_rounding_is_fine_against_the_step(value: float, step: float) -> None:
     ],
 )
 def test_wrong_arguments(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(SceneError) as caught:
+    with pytest.raises(clfractal.SceneError) as caught:
         variations(BULB, **arguments)
     assert str(caught.value) == message
 
@@ -388,9 +390,9 @@ def test_words_and_amounts_agree() -> None:
 # --- pictures ---
 
 
-def framebuffer(lightness: Any, covered: Any = 1.0) -> Framebuffer:
+def framebuffer(lightness: Any, covered: Any = 1.0) -> clfractal.Framebuffer:
     width, height = PREVIEW_SIZE
-    found = Framebuffer(("R", "G", "B", "A"), PREVIEW_SIZE)
+    found = clfractal.Framebuffer(("R", "G", "B", "A"), PREVIEW_SIZE)
     shades = np.broadcast_to(np.asarray(lightness, np.float32), (height, width))
     found.fill({**dict.fromkeys("RGB", shades), "A": np.broadcast_to(np.float32(covered), (height, width))})
     return found
@@ -411,7 +413,7 @@ def test_what_a_worthwhile_picture_is() -> None:
 
 def test_previews_of_pictures_that_show_something_and_nothing(device: Device) -> None:
     away = BULB.model_copy(update={"camera": {"position": [0, -3, 0], "target": [0, -9, 0]}})
-    with Engine(device) as engine:
+    with clfractal.Engine(device) as engine:
         channels = ["R", "G", "B", "A"]
         assert worthwhile(engine.render(small_scene(BULB, *PREVIEW_SIZE), channels=channels))
         assert not worthwhile(engine.render(small_scene(away, *PREVIEW_SIZE), channels=channels))
@@ -419,7 +421,9 @@ def test_previews_of_pictures_that_show_something_and_nothing(device: Device) ->
 
 @pytest.mark.parametrize("name", ["mandelbulb", "kaleidoscopic_ifs", "bulbox", "quaternion_julia", "hast"])
 def test_previews_of_variations_share_one_program(name: str) -> None:
-    scene = load_scene({"version": 1, "formula": {"name": name}, "camera": {"position": [0, -9, 0]}})
+    scene = clfractal.load_scene(
+        {"version": 1, "formula": {"name": name}, "camera": {"position": [0, -9, 0]}}
+    )
     found = variations(scene, strength="heavy", kinds=["formula"])
     texts = {write_formula(small_scene(each.scene, 16, 9).chain).text for each in found}
     assert texts == {write_formula(small_scene(scene, 16, 9).chain).text}
@@ -428,7 +432,7 @@ def test_previews_of_variations_share_one_program(name: str) -> None:
 
 def test_a_preview_is_small_and_for_one_eye() -> None:
     for path in SCENES:
-        scene = load_scene(path)
+        scene = clfractal.load_scene(path)
         small = small_scene(scene, 96, 54)
         assert (small.image.width, small.image.height, small.stereo) == (96, 54, None)
         assert small.renderer.samples <= 4

@@ -21,11 +21,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as arrays
 
-from clfractal.errors import FileError
+import clfractal
 from clfractal.files import volume_file as module
 from clfractal.files import voxel_data
 from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_slabs, write_volume
-from clfractal.scene.model import Scene
 from tests.files.limits import rewrite
 from tests.scenes import scene_of
 
@@ -278,7 +277,7 @@ def test_wrong_slabs_are_our_own_mistake(tmp_path: Path) -> None:
 
 
 def test_an_extension_that_is_not_known(tmp_path: Path) -> None:
-    with pytest.raises(FileError, match=r"unknown extension '\.raw'; known: \.nrrd, \.npy"):
+    with pytest.raises(clfractal.FileError, match=r"unknown extension '\.raw'; known: \.nrrd, \.npy"):
         write_volume(tmp_path / "v.raw", box(ramp("u1")))
 
 
@@ -391,7 +390,7 @@ def test_one_block_in_three_spaces(space: str, expected: tuple[float, ...], tmp_
         "space directions: (0.1,0,0) (0,0.1,0) (0,0,0.1)\nspace origin: (-1,-1,-1)\n\n".encode()
         + values.tobytes()
     )
-    scene: Scene = scene_of(
+    scene: clfractal.Scene = scene_of(
         {"name": "mandelbulb"}, {}, None, folder=tmp_path, renderer={"type": "volume", "file": "v.nrrd"}
     )
     grid = scene.given

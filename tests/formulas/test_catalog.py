@@ -12,10 +12,8 @@ import pytest
 
 import clfractal
 from clfractal.cli.list_formulas import list_formulas, tell_formula
-from clfractal.errors import ClfractalError, FileError, FormulaError
 from clfractal.formulas import catalog
 from clfractal.formulas.reference import escape
-from clfractal.scene.load import dump_scene, load_scene
 from tests.formulas.own_formulas import BALL_FILE
 
 REQUIRED = [
@@ -100,9 +98,9 @@ def test_the_bounds_are_not_much_larger_than_the_set(name: str) -> None:
 
 
 def test_unknown_names_and_chains() -> None:
-    with pytest.raises(FormulaError, match="did you mean 'mandelbox'"):
+    with pytest.raises(clfractal.FormulaError, match="did you mean 'mandelbox'"):
         catalog.load("mandelbx")
-    with pytest.raises(FormulaError, match="is a chain"):
+    with pytest.raises(clfractal.FormulaError, match="is a chain"):
         catalog.load("bulbox")
     assert catalog.is_chain("bulbox")
     assert not catalog.is_chain("hast")
@@ -131,11 +129,11 @@ def test_formulas_in_files(tmp_path: Path) -> None:
 
 def test_an_error_in_a_file_has_line_and_column(tmp_path: Path) -> None:
     path = write(tmp_path, "ball.yaml", BALL_FILE.replace("y*r, z*r", "y*r, z*q"))
-    with pytest.raises(FormulaError) as caught:
+    with pytest.raises(clfractal.FormulaError) as caught:
         catalog.resolve({"file": "ball.yaml"}, tmp_path)
     assert str(caught.value).startswith("ball.yaml:5:19: map.2: unknown name 'q'")
     path.write_text(BALL_FILE.replace("degree", "dgree"))
-    with pytest.raises(FormulaError, match=r"ball.yaml:7:1: unknown key 'dgree'; did you mean 'degree'"):
+    with pytest.raises(clfractal.FormulaError, match=r"ball.yaml:7:1: unknown key 'dgree'; did you mean 'degree'"):
         catalog.load_chain(path)
 
 
@@ -150,13 +148,13 @@ def test_chains_in_files(tmp_path: Path) -> None:
     again = catalog.resolve(chain.source)
     assert (again.radius, again.bailout, again.cycle_length) == (3.0, 9.0, 3)
     write(tmp_path, "self.yaml", "chain: [{file: self.yaml}]\n")
-    with pytest.raises(FormulaError, match="cannot hold another chain"):
+    with pytest.raises(clfractal.FormulaError, match="cannot hold another chain"):
         catalog.resolve({"file": "self.yaml"}, tmp_path)
 
 
 @pytest.mark.parametrize("name", ["../ball.yaml", "/etc/hostname", "", "a/../../b.yaml", "x\0y"])
 def test_paths_out_of_reach_are_refused(name: str, tmp_path: Path) -> None:
-    with pytest.raises(FileError, match="inside the scene's folder"):
+    with pytest.raises(clfractal.FileError, match="inside the scene's folder"):
         catalog.resolve({"file": name}, tmp_path)
 
 
@@ -164,10 +162,10 @@ def test_links_out_of_the_folder_and_odd_files_are_refused(tmp_path: Path) -> No
     folder = tmp_path / "scenes"
     folder.mkdir()
     (folder / "link.yaml").symlink_to(write(tmp_path, "ball.yaml", BALL_FILE))
-    with pytest.raises(FileError, match="leads out"):
+    with pytest.raises(clfractal.FileError, match="leads out"):
         catalog.resolve({"file": "link.yaml"}, folder)
     for spec in ({"file": "missing.yaml"}, {"file": "."}):
-        with pytest.raises(ClfractalError) as caught:
+        with pytest.raises(clfractal.ClfractalError) as caught:
             catalog.resolve(spec, folder)
         assert "\n" not in str(caught.value)
 
@@ -206,7 +204,7 @@ def ball(title: str) -> str:
 def scene_of(place: Path, name: str, **keys: Any) -> Any:
     path = place / "scenes" / "scene.yaml"
     path.write_text(SCENE.replace("NAME", name))
-    return load_scene(path, **keys)
+    return clfractal.load_scene(path, **keys)
 
 
 def test_a_name_is_looked_for_beside_the_scene_and_then_on_the_shelf(place: Path) -> None:
@@ -228,9 +226,9 @@ def test_the_scene_holds_the_formula_inline(place: Path) -> None:
     path.write_text(BALL_FILE)
     scene = scene_of(place, "round")
     assert path in [Path(each) for each in scene.files]
-    text = dump_scene(scene)
+    text = clfractal.dump_scene(scene)
     path.unlink()
-    again = load_scene(text)
+    again = clfractal.load_scene(text)
     assert again.formula.name is None
     assert again.chain == scene.chain
 
@@ -252,7 +250,7 @@ def test_members_of_chains_and_files_of_formulas(place: Path) -> None:
     assert [link.bound.formula.title for link in loaded.chain.links][:2] == ["Part", "Ball"]
     path = place / "scenes" / "scene.yaml"
     path.write_text("version: 1\nformula: {chain: [{name: hast}, {name: round}]}\ncamera: {}\n")
-    assert load_scene(path).chain.links[1].bound.formula.title == "Ball"
+    assert clfractal.load_scene(path).chain.links[1].bound.formula.title == "Ball"
 
 
 def test_a_chain_of_ones_own_names_the_formulas_beside_it(
@@ -279,14 +277,14 @@ def test_python_and_the_list_know_them(place: Path) -> None:
     assert f"in {place / 'shelf'}:\nround" in listed
     assert "unknown key 'extra'" in listed.split("in formulas:")[1]
     assert tell_formula("round").startswith("round: Ball\n\nreference: none, 2024")
-    with pytest.raises(ClfractalError, match="unknown key 'extra'"):
+    with pytest.raises(clfractal.ClfractalError, match="unknown key 'extra'"):
         tell_formula("oval")
 
 
 def test_an_unknown_name_is_compared_with_all(place: Path) -> None:
     (place / "scenes" / "formulas" / "snowflake.yaml").write_text(BALL_FILE)
     for given, nearest in (("snowflak", "snowflake"), ("mandelbx", "mandelbox")):
-        with pytest.raises(ClfractalError) as caught:
+        with pytest.raises(clfractal.ClfractalError) as caught:
             scene_of(place, given)
         path = place / "scenes" / "scene.yaml"
         message = f"formula.name: unknown formula {given!r}; did you mean {nearest!r}?"
@@ -296,7 +294,7 @@ def test_an_unknown_name_is_compared_with_all(place: Path) -> None:
 def test_an_error_in_one_has_its_line_and_column(place: Path) -> None:
     path = place / "shelf" / "round.yaml"
     path.write_text(BALL_FILE.replace("y*r, z*r", "y*r, z*q"))
-    with pytest.raises(ClfractalError) as caught:
+    with pytest.raises(clfractal.ClfractalError) as caught:
         scene_of(place, "round")
     assert f"{path}:5:19: " in str(caught.value)
     assert "unknown name 'q'" in str(caught.value)
@@ -305,14 +303,14 @@ def test_an_error_in_one_has_its_line_and_column(place: Path) -> None:
 def test_what_cannot_be_used_is_told(place: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (place / "shelf" / "ball.yaml").write_text(BALL_FILE)
     (place / "scenes" / "formulas" / "link.yaml").symlink_to(place / "shelf" / "ball.yaml")
-    with pytest.raises(ClfractalError, match="leads out of the scene's folder"):
+    with pytest.raises(clfractal.ClfractalError, match="leads out of the scene's folder"):
         scene_of(place, "link")
     gone = str(place / "gone")
     monkeypatch.setenv("CLFRACTAL_FORMULAS", os.pathsep.join([str(place / "shelf"), gone]))
-    with pytest.raises(ClfractalError) as caught:
+    with pytest.raises(clfractal.ClfractalError) as caught:
         scene_of(place, "mandelbx")
     assert f"CLFRACTAL_FORMULAS: there is no folder {gone!r}" in str(caught.value)
-    with pytest.raises(ClfractalError, match="there is no folder"):
+    with pytest.raises(clfractal.ClfractalError, match="there is no folder"):
         list_formulas()
     # The library needs no other folder.
     assert scene_of(place, "hast").formula.name == "hast"
@@ -325,7 +323,7 @@ def test_a_folder_that_cannot_be_read_is_named(place: Path, monkeypatch: pytest.
         raise PermissionError(13, "Permission denied", str(path))
 
     monkeypatch.setattr("clfractal.formulas.own.os.listdir", refused)
-    with pytest.raises(ClfractalError) as caught:
+    with pytest.raises(clfractal.ClfractalError) as caught:
         scene_of(place, "mandelbx")
     folder = place / "scenes" / "formulas"
     assert f"formula.name: {folder}: cannot be read: Permission denied; unknown" in str(caught.value)

@@ -11,12 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from clfractal.errors import FormulaError
+import clfractal
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import Parameter
 from clfractal.formulas.opencl import FormulaText, forget_texts, write_formula
-from clfractal.scene.load import load_scene
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 WITH_PARAMETERS = [name for name in SINGLE if catalog.load(name).parameters]
@@ -69,7 +68,7 @@ def loaded(spec: dict[str, Any]) -> Chain | None:
     """None for values that give the formula no meaning (a radius that gets too large, an infinite f(0))."""
     try:
         return catalog.load_chain(spec)
-    except FormulaError:
+    except clfractal.FormulaError:
         return None
 
 
@@ -216,7 +215,7 @@ ERRORS = [
 @pytest.mark.parametrize(("formula", "path", "message"), ERRORS)
 def test_mistakes_are_told_with_their_place(formula: Any, path: str, message: str) -> None:
     with pytest.raises(Exception, match="formula") as caught:
-        load_scene({"version": 1, "formula": formula, "camera": {}})
+        clfractal.load_scene({"version": 1, "formula": formula, "camera": {}})
     assert f"{path}: " in str(caught.value)
     assert message in str(caught.value)
 
@@ -250,7 +249,7 @@ def test_a_branch_that_is_not_taken_may_be_no_number() -> None:
     spec = {"inline": formula, "parameters": {"p": 0}}
     assert float("inf") in write_formula(catalog.load_chain(spec)).constants
     plain = {"inline": {**formula, "map": ["x*x", "2*x*y*p**-1", "z"]}, "parameters": {"p": 0}}
-    with pytest.raises(FormulaError, match="is not a finite number"):
+    with pytest.raises(clfractal.FormulaError, match="is not a finite number"):
         write_formula(catalog.load_chain(plain))
 
 
@@ -283,7 +282,7 @@ def test_a_chain_can_be_sent_elsewhere() -> None:
 
 
 def test_a_dragged_parameter_costs_hardly_any_time() -> None:
-    scene = load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
+    scene = clfractal.load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
 
     def moved(phase: float) -> float:
         formula = scene.formula.model_copy(update={"parameters": {"theta_phase": phase}})

@@ -12,12 +12,11 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from clfractal.errors import ClfractalError, FormulaError
+import clfractal
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.reference import distance, escape, mp_escape, mp_orbit
 from clfractal.formulas.turns import spans_of
-from clfractal.scene.load import load_scene
 from tests.formulas.own_formulas import BALL
 
 
@@ -64,7 +63,7 @@ turns = st.builds(
 def test_turns_are_those_of_a_walk(members: list[Turn]) -> None:
     walked = simulated(members, 60)
     if walked is None:
-        with pytest.raises(FormulaError, match="start and stop leave a gap"):
+        with pytest.raises(clfractal.FormulaError, match="start and stop leave a gap"):
             spans_of(members)
         return
     assert [member_at(members, n) for n in range(60)] == walked
@@ -110,8 +109,8 @@ GAPS = [
 
 @pytest.mark.parametrize(("members", "where"), GAPS)
 def test_a_gap_is_refused(members: list[dict[str, Any]], where: str) -> None:
-    with pytest.raises(ClfractalError) as caught:
-        load_scene({"version": 1, "formula": {"chain": members}, "camera": {}})
+    with pytest.raises(clfractal.ClfractalError) as caught:
+        clfractal.load_scene({"version": 1, "formula": {"chain": members}, "camera": {}})
     text = f"formula.chain: no formula takes part {where}: start and stop leave a gap"
     assert str(caught.value) == text
 
@@ -127,12 +126,12 @@ WRONG = [
 @pytest.mark.parametrize(("keys", "key", "words"), WRONG)
 def test_mistakes_are_told_with_their_place(keys: dict[str, Any], key: str, words: str) -> None:
     spec = {"chain": [{"name": "mandelbox"}, {"name": "hast", **keys}]}
-    with pytest.raises(ClfractalError) as caught:
-        load_scene({"version": 1, "formula": spec, "camera": {}})
+    with pytest.raises(clfractal.ClfractalError) as caught:
+        clfractal.load_scene({"version": 1, "formula": spec, "camera": {}})
     assert f"formula.chain.1.{key}: " in str(caught.value)
     assert words in str(caught.value)
     # A chain in a file or from Python has no schema before it.
-    with pytest.raises(FormulaError) as raised:
+    with pytest.raises(clfractal.FormulaError) as raised:
         catalog.resolve(spec)
     assert raised.value.where.path == f"chain.1.{key}"
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from itertools import chain
 from typing import Any
 
+import clfractal
 from clfractal.device import lane_probe as probe
 from clfractal.device import peak
 from clfractal.device.source import FlatText, SourceMap
@@ -18,8 +19,6 @@ from clfractal.geometry.solids import Body
 from clfractal.integrators import cut_plane, points, surface, trial, volume
 from clfractal.integrators.declarations import STRUCTS
 from clfractal.integrators.plan import make_plan
-from clfractal.scene.load import load_scene
-from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels import programs
 from tests.device import struct_layout
@@ -90,7 +89,9 @@ def of_more(count: int, precision: Precision) -> Iterator[Named]:
     """The programs of renderers that no picture has."""
     camera = {"position": [0, -4, 1], "target": [0, 0, 0]}
     for name, sections in _MORE.items():
-        scene = load_scene({"version": 1, "formula": {"name": "hast"}, "camera": camera, **sections})
+        scene = clfractal.load_scene(
+            {"version": 1, "formula": {"name": "hast"}, "camera": camera, **sections}
+        )
         for part, text in of_scene(scene, count, precision):
             yield f"{part} {name}", text
 
@@ -102,7 +103,7 @@ def of_pictures(count: int, precision: Precision, pictures: Sequence[str]) -> It
             yield f"{part} {name}", text
 
 
-def of_scene(scene: Scene, count: int, precision: Precision) -> Iterator[Named]:
+def of_scene(scene: clfractal.Scene, count: int, precision: Precision) -> Iterator[Named]:
     """The programs that render a scene, each by what it does."""
     plan = make_plan(scene, precision=precision, lanes=count, channels=CHANNELS)
     # What moves meanwhile makes no difference to the texts.

@@ -15,7 +15,6 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.integrators import points
 from clfractal.integrators.plan import make_plan
 from clfractal.integrators.volume import grid_key
-from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests import scenes
 from tests.devices import device
@@ -26,13 +25,15 @@ from tests.voxels.grids import ROUNDED, decoded, differing_voxels, filled, voxel
 from tests.voxels.joined import EVERY_JOIN, JULIA, SPONGE, belongs, own_places
 
 
-def scene_of(objects: dict[str, Any], formula: dict[str, Any] | None = None, **settings: Any) -> Scene:
+def scene_of(
+    objects: dict[str, Any], formula: dict[str, Any] | None = None, **settings: Any
+) -> clfractal.Scene:
     renderer = {"type": "volume", "box": {"size": 4.0}, "resolution": 48, **settings}
     own = formula if formula is not None else {"name": "mandelbulb", "iterations": 6}
     return scenes.scene_of(own, {"position": [0, -4, 0]}, None, renderer=renderer, objects=objects)
 
 
-def check(scene: Scene, **options: Any) -> Any:
+def check(scene: clfractal.Scene, **options: Any) -> Any:
     grid = filled(scene, **options)
     expected = belongs(scene, voxel_points(grid.place))
     assert 0.02 < expected.mean() < 0.9
