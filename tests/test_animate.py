@@ -157,6 +157,8 @@ REFUSED = {
     ("-o", "f.png"): "f.png: must have # where the frame's number goes, such as f_####.png",
     ("-o", "f#.gif"): "f0.gif: unknown extension '.gif'",
     ("--codec", "h264"): "--codec: applies to films, such as -o film.mp4",
+    ("--crf", "3"): "--crf: applies to films, such as -o film.mp4",
+    ("-o", "a.mp4", "--set", "background=transparent"): "scene.yaml: background: must be a colour",
     ("-o", "-"): "frames are several files",
     ("-o", "#############.png"): "must have at most 12 # in a row",
     ("-o", "none/f#.png"): "none/f0.png: cannot be written: there is no folder",
@@ -170,7 +172,7 @@ REFUSED = {
 
 
 @pytest.mark.parametrize("options", REFUSED)
-def test_mistakes_are_refused_before_a_frame(clf: InProcess, options: tuple[str, str]) -> None:
+def test_mistakes_are_refused_before_a_frame(clf: InProcess, options: tuple[str, ...]) -> None:
     before = names()
     assert clf("animate", "scene.yaml", *options).is_one_line(2, REFUSED[options])
     assert names() == before

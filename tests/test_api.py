@@ -128,18 +128,6 @@ def test_a_region_is_a_part_of_the_whole(tmp_path: Path) -> None:
     assert header["displayWindow"] == (0, 0, 39, 35)
 
 
-def test_progress_can_end_a_render() -> None:
-    seen: list[int] = []
-
-    def stop(state: clfractal.Progress) -> None:
-        seen.append(state.tiles_done)
-        raise TimeoutError
-
-    with pytest.raises(TimeoutError):
-        clfractal.render(SCENE, progress=stop)
-    assert len(seen) == 1
-
-
 def test_a_tone_reaches_what_is_shown_and_not_the_film(tmp_path: Path) -> None:
     plain = clfractal.render(SCENE)
     bent = clfractal.render(SCENE + "output: {tone: agx}\n")

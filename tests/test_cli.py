@@ -6,7 +6,6 @@ import json
 import os
 import pty
 import subprocess
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -18,8 +17,6 @@ import typer
 import clfractal
 from clfractal.cli import progress
 from clfractal.cli.program import app
-from clfractal.cli.progress import Reporter
-from clfractal.cli.shell import Shell
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
 from clfractal.formulas import catalog
@@ -104,20 +101,6 @@ def test_size_keeps_the_camera(here: Path, clf: InProcess) -> None:
     assert np.abs(blocks - small).mean() < 0.05
 
 
-def test_statistics(here: Path, clf: InProcess) -> None:
-    works(clf("render", "scene.yaml", "-o", "a.png", "--samples", "3", "--stats", "s.json"))
-    stats = json.loads((here / "s.json").read_text())
-    promised = {"device", "platform", "precision", "lanes", "build_ms", "kernel_ms", "wall_ms", "rays"}
-    promised |= {"iterations", "steps_per_ray", "bad_distances", "peak_memory_mb"}
-    assert promised <= set(stats)
-    assert stats["rays"] == 40 * 36 * 3
-    assert stats["precision"] == "float32"
-    assert stats["kernel_ms"] > 0
-    assert stats["wall_ms"] > 0
-    assert 1 < stats["steps_per_ray"] < 1000
-    assert 10 < stats["peak_memory_mb"] < 10_000
-
-
 def test_schema_is_json(clf: InProcess) -> None:
     ended = works(clf("schema"))
     schema = json.loads(ended.out)
@@ -135,14 +118,6 @@ def test_each_formula_tells_about_itself(clf: InProcess, name: str) -> None:
     assert ended.out.startswith(f"{name}: ")
     for parameter in [] if catalog.is_chain(name) else catalog.load(name).parameters:
         assert f"  {parameter.name}: " in ended.out
-
-
-def test_devices(clf: InProcess) -> None:
-    ended = works(clf("devices"))
-    head, *rows = ended.out.splitlines()
-    assert head.split() == ["index", "name", "platform", "memory", "float64", "GL", "lanes", "speed"]
-    assert len(rows) == len(clfractal.devices())
-    assert sum(row.startswith("*") for row in rows) == 1
 
 
 @pytest.mark.parametrize(
@@ -181,22 +156,6 @@ def test_a_reader_that_has_seen_enough(here: Path) -> None:
     assert running.stderr is not None
     assert running.stderr.read() == b""
     assert running.wait() == 0
-
-
-def test_plain_lines_come_at_most_every_two_seconds(
-    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    now = [100.0]
-    monkeypatch.setattr(time, "monotonic", lambda: now[0])
-    reporter = Reporter(Shell(owns_process=False), 1000)
-    state = clfractal.Progress(1000)
-    for tick in range(1000):
-        now[0] += 0.01  # ten seconds in all
-        state.tiles_done, state.rays = tick, 1000 * tick
-        reporter(state)
-    lines = capsys.readouterr().err.splitlines()
-    assert 4 <= len(lines) <= 5
-    assert all("rays/s" in line and "left" in line for line in lines)
 
 
 def test_a_bar_on_a_terminal(here: Path) -> None:

@@ -146,9 +146,10 @@ def test_devices_as_json(clf: InProcess) -> None:
     found = json.loads(ended.out)
     assert ended.status == 0
     assert len([each for each in found if each["default"]]) == 1
-    table = clf("devices").out.splitlines()[1:]
-    assert len(table) == len(found)
+    head, *table = clf("devices").out.splitlines()
+    assert head.split() == ["index", "name", "platform", "memory", "float64", "GL", "lanes", "speed"]
     for line, each in zip(table, found, strict=True):
+        assert line.startswith("*") == each["default"]
         assert each["index"] in line
         assert each["name"] in line
         assert f"{each['memory'] / 2**30:.1f} GiB" in line

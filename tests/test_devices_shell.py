@@ -169,19 +169,3 @@ def test_a_film_by_several_devices(halves: str, tmp_path: Path) -> None:
     for number in range(3):
         assert planes(tmp_path / f"one_{number}.exr") == planes(tmp_path / f"two_{number}.exr")
         assert "clfractalDevices" in read_exr(tmp_path / f"two_{number}.exr")[1]
-
-
-@pytest.mark.parametrize("work", ["render", "animate"])
-def test_wrong_devices(work: str, halves: str, tmp_path: Path) -> None:
-    scene = HEAVY + "animation: {frames: 3, tracks: {}}\n"
-    (tmp_path / "heavy.yaml").write_text(scene)
-    index = halves.split("/")[0]
-    for options, message in (
-        (["--device", index, "--device", index], f"--device: {index} is named twice"),
-        (["--device", "all", "--device", index], "--device: all stands alone: it names every device"),
-        (["--device", index, "--device", "no such"], "unknown device 'no such'; available: "),
-        (["--device", f"{index}/1000"], "compute units, but 1000 are wanted"),
-    ):
-        ended = process([work, "heavy.yaml", "-o", "out_#.exr", *options], tmp_path)
-        assert ended.is_one_line(2, message)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["heavy.yaml"]

@@ -45,16 +45,6 @@ def test_files_of_the_shell(clf: InProcess) -> None:
     assert mean == sorted(set(mean))
 
 
-def test_films_of_python() -> None:
-    films = [
-        clfractal.render(clfractal.load_scene(SCENE, overrides=[f"output.exposure={stops}"]))
-        for stops in (0, 3)
-    ]
-    for channel in films[0]:
-        np.testing.assert_array_equal(films[1][channel], films[0][channel])
-    assert (films[1].to_rgb8(3) > films[0].to_rgb8(0)).any()
-
-
 def test_the_limit_is_that_of_the_scenes_own_light() -> None:
     """What a mirror or the environment brings is never lighter, whatever the exposure."""
     black = "material.diffuse=0", "material.ambient=0", "material.specular=0", "material.reflection=1"

@@ -56,7 +56,7 @@ def test_a_sheet_shows_the_whole_film_evenly(count: int, step: int) -> None:
 
 def test_missing_frames_are_listed_and_rendered(clf: InProcess) -> None:
     listed = ("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--missing")
-    assert clf(*listed).out.split() == ["0-5"]
+    assert clf(*listed).out.split() == ["0-5"] == clf("animate", "scene.yaml", "--missing").out.split()
     ended = clf("animate", "scene.yaml", "-o", "f_##.exr", "-o", "p#.png", "--frames", "1-3")
     assert ended.err.splitlines()[-1] == "3 frames of the film are missing: 0, 4-5"
     Path("p3.png").write_bytes(Path("p3.png").read_bytes()[:-5])
@@ -106,15 +106,6 @@ def test_a_damaged_frame_is_told_with_advice(clf: InProcess) -> None:
     assert ended.err.endswith("; remove it, or render without --resume\n")
 
 
-def test_the_missing_of_a_film_or_of_no_pattern(clf: InProcess) -> None:
-    ended = clf("animate", "scene.yaml", "-o", "film.mp4", "--missing")
-    assert (ended.status, ended.err.count("\n")) == (2, 1)
-    assert "--missing: applies to numbered pictures" in ended.err
-    ended = clf("animate", "scene.yaml", "-o", "a.png", "--missing")
-    assert (ended.status, "must have # where the frame's number goes" in ended.err) == (2, True)
-    assert clf("animate", "scene.yaml", "--missing").out.split() == ["0-5"]
-
-
 def test_a_sheet_of_small_frames(clf: InProcess) -> None:
     ended = works(clf("animate", "scene.yaml", "--preview", "sheet.png", "--frames", "0-5:2"))
     assert ended.err.splitlines()[-1].startswith("sheet.png: 3 of 6 frames, ")
@@ -127,14 +118,17 @@ def test_a_sheet_of_small_frames(clf: InProcess) -> None:
     assert [path.name for path in Path().iterdir() if path.suffix == ".exr"] == []
 
 
-def test_a_sheet_goes_alone(clf: InProcess) -> None:
-    for options, message in (
-        (("--preview", "s.png", "-o", "f_##.png"), "--preview: writes a sheet alone"),
-        (("--preview", "s.gif"), "s.gif"),
-        (("--preview", "scene.yaml"), "scene.yaml"),
-        (("--preview", "s.png", "--frames", "9"), "--frames: must be frames 0 to 5"),
-    ):
-        ended = clf("animate", "scene.yaml", *options)
-        assert (ended.status, ended.err.count("\n")) == (2, 1), ended
-        assert message in ended.err
+REFUSED = {
+    ("-o", "film.mp4", "--missing"): "--missing: applies to numbered pictures",
+    ("-o", "a.png", "--missing"): "must have # where the frame's number goes",
+    ("--preview", "s.png", "-o", "f_##.png"): "--preview: writes a sheet alone",
+    ("--preview", "s.gif"): "s.gif",
+    ("--preview", "scene.yaml"): "scene.yaml",
+    ("--preview", "s.png", "--frames", "9"): "--frames: must be frames 0 to 5",
+}
+
+
+@pytest.mark.parametrize("options", REFUSED, ids=" ".join)
+def test_what_is_refused(clf: InProcess, options: tuple[str, ...]) -> None:
+    assert clf("animate", "scene.yaml", *options).is_one_line(2, REFUSED[options])
     assert Path("scene.yaml").read_text() == SCENE

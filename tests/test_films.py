@@ -290,16 +290,6 @@ def test_without_the_package_it_says_what_to_install(tmp_path: Path, monkeypatch
         plan_film(tmp_path / "a.mp4", Recipe(), SIZE, 25)
 
 
-def test_options_of_films_need_a_film(clf: InProcess) -> None:
-    assert clf("animate", "scene.yaml", "--crf", "3").is_one_line(
-        2, "--crf: applies to films, such as -o film.mp4"
-    )
-    clear = ("--set", "background=transparent")
-    assert clf("animate", "scene.yaml", "-o", "a.mp4", *clear).is_one_line(
-        2, "scene.yaml: background: must be a colour"
-    )
-
-
 def test_a_picture_that_cannot_be_read_makes_no_film(pictures: list[Path], tmp_path: Path) -> None:
     pictures[2].write_bytes(b"nothing")
     path = tmp_path / "film.mp4"

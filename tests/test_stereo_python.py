@@ -94,14 +94,6 @@ def test_what_is_no_single_film() -> None:
         clfractal.render(stereo("split"), region=(70, 0, 11, 1))
 
 
-def test_progress_goes_on_over_both_eyes() -> None:
-    seen: list[tuple[int, int]] = []
-    clfractal.render(stereo("split"), progress=lambda state: seen.append((state.tiles_done, state.tiles)))
-    assert seen == sorted(seen)
-    assert {tiles for _, tiles in seen} == {8}
-    assert seen[-1][0] >= 7
-
-
 def test_a_volumes_file_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """By both eyes, and by the preview that a fit takes before: what is rendered is what was checked."""
     places = np.stack(np.meshgrid(*[np.linspace(-1.2, 1.2, 24)] * 3, indexing="ij"))

@@ -176,13 +176,6 @@ def test_nothing_that_exists_is_replaced(clf: InProcess, there: str) -> None:
     assert Path(there).read_text() == "mine"
 
 
-def test_nothing_that_could_change(clf: InProcess) -> None:
-    ended = clf("vary", "scene.yaml", "--only", "formula", "--set", "formula.name=makin_brot", "--quiet")
-    message = "scene.yaml: nothing can be varied: the scene has no formula that may change"
-    assert ended.is_one_line(2, message)
-    assert names() == []
-
-
 def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     import shutil
 

@@ -34,7 +34,7 @@ def test_a_damaged_entry_is_none_and_goes(empty_cache: Path, damage: bytes) -> N
     assert not entry.exists()
 
 
-def test_one_changed_byte_is_noticed(empty_cache: Path) -> None:
+def test_each_changed_or_missing_byte_is_noticed(empty_cache: Path) -> None:
     cache.store_blob("a", b"binary")
     (entry,) = empty_cache.rglob("a.bin")
     stored = bytearray(entry.read_bytes())
@@ -42,6 +42,8 @@ def test_one_changed_byte_is_noticed(empty_cache: Path) -> None:
         changed = bytearray(stored)
         changed[position] ^= 1
         entry.write_bytes(changed)
+        assert cache.load_blob("a") is None, position
+        entry.write_bytes(stored[:position])
         assert cache.load_blob("a") is None, position
 
 

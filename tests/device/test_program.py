@@ -185,14 +185,6 @@ def test_a_binary_that_the_driver_refuses_is_built_again(
     assert _triples(build(device, _TRIPLE, flags=_FLAGS, isolated=False))
 
 
-def test_a_cache_that_cannot_be_written_is_no_error(
-    device: Device, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    (tmp_path / "file").touch()
-    monkeypatch.setenv("CLFRACTAL_CACHE", str(tmp_path / "file" / "cache"))
-    assert _triples(build(device, _TRIPLE, flags=_FLAGS))
-
-
 @pytest.mark.parametrize("isolated", [False, True])
 def test_a_build_failure_knows_our_file_and_line(
     device: Device, empty_cache: Path, tmp_path: Path, isolated: bool, capfd: pytest.CaptureFixture[str]

@@ -52,12 +52,6 @@ def assert_as_films(canvas: Canvas, job: Job, device: Device) -> None:
         np.testing.assert_array_equal(depths[number], framebuffer["Z"])
 
 
-@pytest.mark.parametrize("size", SIZES)
-def test_a_canvas_has_the_bits_of_a_film(size: tuple[int, int], device: Device) -> None:
-    job = job_of(scene_of(*sized(*size)), device)
-    assert_as_films(drawn(job, device), job, device)
-
-
 @pytest.mark.parametrize(
     "overrides", [(LAYOUT,), (STEREO,), (LAYOUT, STEREO), ("renderer.precision=float64",)]
 )

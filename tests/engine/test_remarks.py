@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import pickle
 from pathlib import Path
 from typing import Any
 
@@ -220,11 +219,6 @@ def test_refined_pictures_have_them_at_the_end(engine: clfractal.Engine) -> None
     assert framebuffers[-1].remarks == ()
     framebuffers = list(engine.refine(scene_of(BALL, AWAY, SIZE)))
     one(framebuffers[-1].remarks, "no ray meets the set")
-
-
-def test_they_travel_with_the_film(engine: clfractal.Engine) -> None:
-    framebuffer = engine.render(scene_of(BALL, AWAY, SIZE))
-    assert pickle.loads(pickle.dumps(framebuffer)).remarks == framebuffer.remarks != ()
 
 
 SCENE = """version: 1

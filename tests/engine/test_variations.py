@@ -365,23 +365,6 @@ def test_rounding_is_fine_against_the_step(value: float, step: float) -> None:
     assert abs(rounded(value, step) - value) <= 0.01 * step
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (
-            {"strength": "hevy"},
-            "strength: must be slight, medium or heavy, got 'hevy'; did you mean 'heavy'?",
-        ),
-        ({"kinds": ["colours"]}, "kinds: unknown kind 'colours'; did you mean 'colors'?"),
-        ({"count": 0}, "count: must be from 1 to 100000, got 0"),
-    ],
-)
-def test_wrong_arguments(arguments: dict[str, Any], message: str) -> None:
-    with pytest.raises(clfractal.SceneError) as caught:
-        variations(BULB, **arguments)
-    assert str(caught.value) == message
-
-
 def test_words_and_amounts_agree() -> None:
     assert set(AMOUNT) == set(get_args(Strength))
     assert sorted(AMOUNT, key=lambda word: AMOUNT[word]) == list(STRENGTHS)
