@@ -15,7 +15,6 @@ from clfractal import camera
 from tests.shell import SCENE
 
 POINTS = [[0.0, 0.0, 0.0], [2.0, 2.0, 2.0]]
-BULB = {"name": "mandelbulb"}
 
 RENDER: list[tuple[dict[str, Any], str]] = [
     ({"samples": 2.7}, "samples: must be a whole number, got 2.7"),
