@@ -19,6 +19,7 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.select import Device, sees_host_writes
 from clfractal.device.structs import Precision
 from clfractal.device.watched import CANCELLED, Watched, is_watched
+from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.refine import pass_ranges
 from clfractal.engine.run import Progress, run
@@ -26,12 +27,33 @@ from clfractal.formulas.catalog import load_chain
 from clfractal.integrators import points
 from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.passes import SAMPLING
-from clfractal.integrators.plan import Plan
 from tests.calls import raising
 from tests.engine.small_pictures import BULB, VOLUME, changed, equal
 from tests.render.passes import RENDERERS, SIZE, scene_with
 from tests.render.shots import job_of, plan_of, shoot, stacked
 from tests.variants import one_of
+
+
+def stopped_after(seconds: float, work: Callable[[clfractal.CancelToken], object]) -> float:
+    """When work ends that is cancelled after a while, seconds since it began."""
+    token = clfractal.CancelToken()
+    timer = threading.Timer(seconds, token.cancel)
+    start = time.perf_counter()
+    timer.start()
+    with pytest.raises(clfractal.Stopped):
+        work(token)
+    timer.join()
+    return time.perf_counter() - start
+
+
+def rendered(
+    job: Job, executor: LocalExecutor, samples: tuple[int, int] | None = None, **settings: Any
+) -> clfractal.Framebuffer:
+    """The picture of a job of one view, after a pass of so many samples; settings as for `run`."""
+    image, plan = job.scene.image, job.views[0].plan
+    framebuffer = clfractal.Framebuffer(plan.channels, (image.width, image.height), plan.region)
+    run(job, [framebuffer], executor, samples=samples, **settings)
+    return framebuffer
 
 
 def test_a_token_is_set_by_any_thread() -> None:
@@ -71,21 +93,14 @@ def test_a_token_that_is_set_starts_nothing(text: str, device: Device) -> None:
 
 def test_many_samples_of_few_pixels(device: Device) -> None:
     """One tile with 60,000 samples: its samples are split, or nothing could end it."""
-    token = clfractal.CancelToken()
     scene = changed(BULB, "image.width=32", "image.height=32")
     with clfractal.Engine(device, budget_seconds=0.02) as engine:
         engine.render(scene)
-        timer = threading.Timer(0.2, token.cancel)
-        start = time.perf_counter()
-        timer.start()
-        with pytest.raises(clfractal.Stopped):
-            engine.render(scene, samples=60_000, token=token)
-        assert time.perf_counter() - start < 5
+        assert stopped_after(0.2, lambda token: engine.render(scene, samples=60_000, token=token)) < 5
 
 
 def test_a_build_is_left(device: Device) -> None:
     """Compiling goes on in a child; who waits for it need not."""
-    token = clfractal.CancelToken()
     # A formula that nobody has compiled, and large.
     formula = "{variables: [x, y, z], map: ["
     terms = " + ".join(f"sin({number}.125 * x) * cos({number}.25 * y)" for number in range(60))
@@ -96,12 +111,7 @@ def test_a_build_is_left(device: Device) -> None:
     scene = clfractal.load_scene(BULB, overrides=[f"formula={{iterations: 8, inline: {formula}}}"])
     with clfractal.Engine(device) as engine:
         engine.render(changed(BULB))  # lanes are measured
-        timer = threading.Timer(0.3, token.cancel)
-        start = time.perf_counter()
-        timer.start()
-        with pytest.raises(clfractal.Stopped):
-            engine.render(scene, token=token)
-        assert time.perf_counter() - start < 3
+        assert stopped_after(0.3, lambda token: engine.render(scene, token=token)) < 3
         engine.render(changed(BULB))
     isolate.end_children()
 
@@ -171,11 +181,8 @@ class Impatient(clfractal.CancelToken):
 class Interrupted:
     """Renders a picture in passes, of which each is interrupted a few times."""
 
-    def __init__(
-        self, scene: clfractal.Scene, plan: Plan, device: Device, executor: LocalExecutor, seed: int
-    ) -> None:
-        self.job, self.plan, self.executor = job_of(scene, plan, device), plan, executor
-        self.size = (scene.image.width, scene.image.height)
+    def __init__(self, job: Job, executor: LocalExecutor, seed: int) -> None:
+        self.job, self.executor = job, executor
         self.random = np.random.default_rng(seed)
         self.stops = 0
 
@@ -185,8 +192,7 @@ class Interrupted:
             for _ in range(tries):
                 self.try_once(samples)
             self.attempt(Impatient(int(self.random.integers(0, 3))), samples)
-            framebuffer = clfractal.Framebuffer(self.plan.channels, self.size, self.plan.region)
-            run(self.job, [framebuffer], self.executor, samples=samples)
+            framebuffer = rendered(self.job, self.executor, samples)
         return framebuffer
 
     def try_once(self, samples: tuple[int, int]) -> None:
@@ -214,9 +220,8 @@ class Interrupted:
         samples: tuple[int, int],
         progress: Callable[[Progress], None] | None = None,
     ) -> None:
-        framebuffer = clfractal.Framebuffer(self.plan.channels, self.size, self.plan.region)
         try:
-            run(self.job, [framebuffer], self.executor, token=token, samples=samples, progress=progress)
+            rendered(self.job, self.executor, samples, token=token, progress=progress)
         except clfractal.Stopped:
             self.stops += 1
 
@@ -232,9 +237,8 @@ def test_an_interrupted_pass_done_anew(kind: str, adaptive: bool, budget: float,
     """With so little time that tiles are rendered in parts, too: packets of a tile then have different samples."""
     size = (20, 17) if budget < 1e-5 else SIZE
     scene = scene_with(kind, size, **(NOISY if adaptive else {}))
-    plan = plan_of(scene, device)
-    wanted = shoot(scene, device)
-    work = Interrupted(scene, plan, device, LocalExecutor(device, budget_seconds=budget), seed=len(kind))
+    job, wanted = job_of(scene, plan_of(scene, device), device), shoot(scene, device)
+    work = Interrupted(job, LocalExecutor(device, budget_seconds=budget), seed=len(kind))
     same_bits(work.framebuffer(pass_ranges(16), tries=4), wanted)
     same_bits(work.framebuffer([(0, 5), (5, 16)], tries=4), wanted)
     assert work.stops > 0
@@ -244,7 +248,8 @@ def test_an_interrupted_pass_done_anew(kind: str, adaptive: bool, budget: float,
 def test_in_float64(kind: str, device: Device) -> None:
     precision: Precision = "float64"
     scene = scene_with(kind, **NOISY)
-    work = Interrupted(scene, plan_of(scene, device, precision), device, LocalExecutor(device), seed=1)
+    job = job_of(scene, plan_of(scene, device, precision), device)
+    work = Interrupted(job, LocalExecutor(device), seed=1)
     same_bits(work.framebuffer(pass_ranges(16), tries=5), shoot(scene, device, precision))
     assert work.stops > 0
 
@@ -254,22 +259,19 @@ def test_in_float64(kind: str, device: Device) -> None:
 def test_with_any_number_of_lanes(lanes: int, device: Device) -> None:
     """Lanes of one packet that have different numbers of samples, because some of their pixels are done."""
     scene = scene_with("surface", **NOISY)
-    plan = plan_of(scene, device, lanes=lanes)
-    whole = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
-    run(job_of(scene, plan, device), [whole], LocalExecutor(device))
+    job = job_of(scene, plan_of(scene, device, lanes=lanes), device)
+    whole = rendered(job, LocalExecutor(device))
     assert len(np.unique(whole["samples"])) > 1
-    executor = LocalExecutor(device, budget_seconds=1e-4)
-    same_bits(
-        Interrupted(scene, plan, device, executor, seed=lanes).framebuffer(pass_ranges(16), tries=4), whole
-    )
+    work = Interrupted(job, LocalExecutor(device, budget_seconds=1e-4), seed=lanes)
+    same_bits(work.framebuffer(pass_ranges(16), tries=4), whole)
 
 
 def test_a_pass_within_a_heavy_tile(device: Device) -> None:
     """Told to end within a launch of many samples: packets that had ended keep them, the others do not."""
     scene = scene_with("surface", (64, 64), samples=1024)
-    plan = plan_of(scene, device)
     wanted = shoot(scene, device)
-    job, executor = job_of(scene, plan, device), LocalExecutor(device, budget_seconds=0.3)
+    job = job_of(scene, plan_of(scene, device), device)
+    executor = LocalExecutor(device, budget_seconds=0.3)
     stops = 0
     for samples in ((0, 128), (128, 1024)):
         for wait in (0.01, 0.03, 0.06, 0.1, 0.15):
@@ -277,13 +279,11 @@ def test_a_pass_within_a_heavy_tile(device: Device) -> None:
             timer = threading.Timer(wait, token.cancel)
             timer.start()
             try:
-                framebuffer = clfractal.Framebuffer(plan.channels, (64, 64), plan.region)
-                run(job, [framebuffer], executor, token=token, samples=samples)
+                rendered(job, executor, samples, token=token)
             except clfractal.Stopped:
                 stops += 1
             timer.join()
-        framebuffer = clfractal.Framebuffer(plan.channels, (64, 64), plan.region)
-        run(job, [framebuffer], executor, samples=samples)
+        framebuffer = rendered(job, executor, samples)
     assert stops >= 4
     same_bits(framebuffer, wanted)
 
@@ -291,58 +291,35 @@ def test_a_pass_within_a_heavy_tile(device: Device) -> None:
 def test_a_pass_that_was_finished_can_be_done_again(device: Device) -> None:
     """As after a cancel that came just behind the last launch."""
     scene = scene_with("surface", **NOISY)
-    plan = plan_of(scene, device)
-    executor = LocalExecutor(device)
+    job, executor = job_of(scene, plan_of(scene, device), device), LocalExecutor(device)
     for samples in ((0, 1), (0, 1), (1, 4), (1, 4), (1, 4), (4, 16), (4, 16)):
-        framebuffer = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
-        run(job_of(scene, plan, device), [framebuffer], executor, samples=samples)
+        framebuffer = rendered(job, executor, samples)
     same_bits(framebuffer, shoot(scene, device))
 
 
 def test_an_interrupted_whole_picture(device: Device) -> None:
     """All samples in one pass: it begins anew with the first."""
     scene = scene_with("surface", **NOISY)
-    plan = plan_of(scene, device)
+    job = job_of(scene, plan_of(scene, device), device)
     executor = LocalExecutor(device, budget_seconds=1e-5)
-    job = job_of(scene, plan, device)
     for wait in (0.001, 0.003, 0.01):
-        token = clfractal.CancelToken()
-        threading.Timer(wait, token.cancel).start()
-        with pytest.raises(clfractal.Stopped):
-            run(
-                job,
-                [clfractal.Framebuffer(plan.channels, SIZE, plan.region)],
-                executor,
-                token=token,
-                samples=(0, 16),
-            )
-        time.sleep(wait)
-    framebuffer = clfractal.Framebuffer(plan.channels, SIZE, plan.region)
-    run(job, [framebuffer], executor, samples=(0, 16))
-    same_bits(framebuffer, shoot(scene, device))
+        stopped_after(wait, lambda token: rendered(job, executor, (0, 16), token=token))
+    same_bits(rendered(job, executor, (0, 16)), shoot(scene, device))
 
 
 def test_what_was_kept_goes_with_a_view_that_could_not_be_taken(device: Device) -> None:
     """An executor tells that passes cannot go on, so that nobody continues with what is not there."""
     scene = scene_with("volume")
-    plan = plan_of(scene, device)
-    executor = LocalExecutor(device)
-    job = job_of(scene, plan, device)
+    job, executor = job_of(scene, plan_of(scene, device), device), LocalExecutor(device)
     assert not executor.keeps(1)
-    run(job, [clfractal.Framebuffer(plan.channels, SIZE, plan.region)], executor, samples=(0, 1))
+    rendered(job, executor, (0, 1))
     assert executor.keeps(1)
     assert not executor.keeps(2)
     executor.kept = type(executor.kept)()
     token = clfractal.CancelToken()
     token.cancel()
     with pytest.raises(clfractal.Stopped):
-        run(
-            job,
-            [clfractal.Framebuffer(plan.channels, SIZE, plan.region)],
-            executor,
-            samples=(1, 2),
-            token=token,
-        )
+        rendered(job, executor, (1, 2), token=token)
     assert not executor.keeps(1)
     executor.forget()
 
@@ -395,31 +372,20 @@ def test_a_cancel_ends_long_orbits(kind: str, device: Device) -> None:
     expected = clfractal.render(short)
     with clfractal.Engine(device, budget_seconds=0.02) as engine:
         equal(engine.render(short), expected)
-        token, asked = clfractal.CancelToken(), []
-
-        def cancel() -> None:
-            asked.append(time.perf_counter())
-            token.cancel()
-
-        timer = threading.Timer(0.4, cancel)
-        timer.start()
-        with pytest.raises(clfractal.Stopped):
-            engine.render(scene, token=token)
-        assert time.perf_counter() - asked[0] < 2
+        assert stopped_after(0.4, lambda token: engine.render(scene, token=token)) < 2.4
         # Nothing of it is left: the next picture is right.
         equal(engine.render(short), expected)
 
 
 def test_lists_of_points_are_cancelled(device: Device) -> None:
-    chain, token = load_chain("hast"), clfractal.CancelToken()
+    chain = load_chain("hast")
     places = np.random.default_rng(1).uniform(-0.1, 0.1, (200_000, 3))
-    timer = threading.Timer(0.3, token.cancel)
-    start = time.perf_counter()
-    timer.start()
     lanes = best_lanes(device, "float32")
-    with pytest.raises(clfractal.Stopped):
-        points.escape(chain, places, 1_000_000, device=device, lanes=lanes, token=token)
-    assert time.perf_counter() - start < 10
+
+    def endless(token: clfractal.CancelToken) -> object:
+        return points.escape(chain, places, 1_000_000, device=device, lanes=lanes, token=token)
+
+    assert stopped_after(0.3, endless) < 10
     counts, inside = points.escape(chain, places[:100], 50, device=device, lanes=lanes)
     assert inside.all()
     assert (counts == 50).all()
