@@ -56,6 +56,12 @@ def wait_for(errors: Terminal, text: str) -> str:
     return errors.getvalue()
 
 
+def doing() -> str:
+    """What is under way, by its name."""
+    found = activity.current()
+    return "" if found is None else found.what
+
+
 def test_lines_tell_what_lasts(monkeypatch: pytest.MonkeyPatch) -> None:
     """The innermost, whole lines, seldomer as it goes on."""
     shell, errors = shell_on(monkeypatch)
@@ -128,8 +134,7 @@ def test_the_files_that_a_scene_reads_are_told(tmp_path: Path, monkeypatch: pyte
         read = getattr(module, name)
 
         def listen(path: Path, *rest: Any, **more: Any) -> Any:
-            found = activity.current()
-            told[Path(path).name] = "" if found is None else found.what
+            told[Path(path).name] = doing()
             return read(path, *rest, **more)
 
         monkeypatch.setattr(module, name, listen)
@@ -147,7 +152,6 @@ def test_the_files_that_a_scene_reads_are_told(tmp_path: Path, monkeypatch: pyte
     )
     load.load_scene(tmp_path / "scene.yaml")
     assert told == {name: f"reading {tmp_path / name}" for name in ("scene.yaml", "scan.npy", "sky.exr")}
-    assert activity.current() is None
 
 
 def test_nothing_is_shown_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -171,15 +175,10 @@ def test_nothing_is_shown_after_the_end(monkeypatch: pytest.MonkeyPatch) -> None
 
 
 def test_what_began_last_is_told() -> None:
-    assert activity.current() is None
     with activity.doing("one"):
         with activity.doing("two"):
-            found = activity.current()
-            assert found is not None
-            assert found.what == "two"
-        found = activity.current()
-        assert found is not None
-        assert found.what == "one"
+            assert doing() == "two"
+        assert doing() == "one"
     assert activity.current() is None
 
 

@@ -72,15 +72,6 @@ def test_small_tiles_lie_in_the_top_left_corner(tmp_path: Path) -> None:
             journal.append(5, np.zeros(wrong, np.float32))
 
 
-def test_a_tile_written_twice_has_its_last_content(tmp_path: Path) -> None:
-    path = tmp_path / "a.partial"
-    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
-    journal.append(3, content(1))
-    journal.append(3, content(3))
-    journal.close()
-    assert np.array_equal(resumed(path).tile(3), content(3))
-
-
 def test_every_truncation_keeps_the_whole_records(tmp_path: Path) -> None:
     path = filled(tmp_path / "a.partial", range(4))
     whole = path.read_bytes()
@@ -132,12 +123,6 @@ def test_damage_after_opening_is_noticed(tmp_path: Path) -> None:
         stream.write(b"\xff")
     with pytest.raises(FileError, match=r"a\.partial: is damaged: tile 1 has changed"):
         journal.tile(1)
-
-
-def test_a_missing_journal_is_begun(tmp_path: Path) -> None:
-    journal = resumed(tmp_path / "a.partial")
-    assert not journal.done.any()
-    assert (tmp_path / "a.partial").exists()
 
 
 @pytest.mark.parametrize(

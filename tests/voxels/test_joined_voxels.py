@@ -69,38 +69,33 @@ def test_values_are_shares_of_what_is_joined() -> None:
 
 
 SMOOTH = {**SIMPLE["sphere"][0], "join": "smooth_union", "smoothness": 0.4}
-# Objects, the own formula, and the sides of the box.
-PROOFS: dict[str, tuple[dict[str, Any], dict[str, Any], float]] = {
-    "every join": (EVERY_JOIN, {"name": "mandelbulb", "iterations": 8}, 4.0),
+# Objects, and the own formula.
+PROOFS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
+    "every join": (EVERY_JOIN, {"name": "mandelbulb", "iterations": 8}),
     "flowing": (
         {"drop": SMOOTH, "cut": {**SIMPLE["box"][0], "join": "cut"}},
         {"name": "hast", "iterations": 20},
-        4.0,
     ),
     "two formulas": (
         {"julia": JULIA},
         {"name": "burning_ship", "iterations": 8},
-        4.0,
     ),
     "in common": (
         {"other": {**JULIA, "join": "intersection", "scale": 1.2}},
         {"name": "hast", "iterations": 12},
-        4.0,
     ),
     "a shape": (
         {"other": {**SPONGE, "scale": 1.5, "position": [0, 0, 0]}},
         {"name": "hast", "iterations": 16},
-        4.0,
     ),
 }
 
 
 @pytest.mark.parametrize("name", one_of(*PROOFS))
 def test_the_octree_leaves_out_nothing(name: str) -> None:
-    objects, formula, side = PROOFS[name]
-    settings = {"resolution": 128, "box": {"size": side}}
-    octree = filled(scene_of(objects, formula, **settings))
-    brute = filled(scene_of(objects, formula, **settings, fill="brute"))
+    octree, brute = (
+        filled(scene_of(*PROOFS[name], resolution=128, fill=fill)) for fill in ("octree", "brute")
+    )
     # (Most of "flowing" is near the set: with the certain share of its distances 0.72 of its voxels are asked.)
     assert octree.stats.evaluated_voxels < 0.75 * brute.stats.evaluated_voxels
     assert differing_voxels(octree, brute) <= 128**3 // 1_000_000
@@ -247,31 +242,32 @@ def test_another_place_of_an_object_is_another_grid() -> None:
     assert len(keys) == 3
 
 
-WRONG: dict[str, tuple[dict[str, Any], dict[str, Any], str, str]] = {
-    "sea": ({"type": "water"}, {}, "objects.sea.type", "cannot be water with renderer volume"),
-    "cut": (
-        {"type": "plane", "join": "smooth_union"},
-        {},
-        "objects.cut.join",
-        "cannot be smooth_union for a plane",
-    ),
-}
-
-
-@pytest.mark.parametrize("name", WRONG)
-def test_what_cannot_be_filled_is_told_at_its_place(name: str) -> None:
-    each, settings, where, message = WRONG[name]
+@pytest.mark.parametrize(
+    ("own", "settings", "where", "message"),
+    [
+        ({"type": "water"}, {}, "objects.own.type", "cannot be water with renderer volume"),
+        (
+            {"type": "plane", "join": "smooth_union"},
+            {},
+            "objects.own.join",
+            "cannot be smooth_union for a plane",
+        ),
+        (EVERY_JOIN["egg"], {"file": "a.npy"}, "objects", "are not joined to a grid from a file"),
+    ],
+)
+def test_what_cannot_be_filled_is_told_at_its_place(
+    own: dict[str, Any],
+    settings: dict[str, Any],
+    where: str,
+    message: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    np.save("a.npy", np.zeros((4, 4, 4), np.float32))
     with pytest.raises(clfractal.SceneError, match=message) as caught:
-        scene_of({name: each}, **settings)
+        scene_of({"own": own}, **settings)
     assert caught.value.where.path == where
-
-
-def test_a_grid_from_a_file_has_no_objects(tmp_path: Path) -> None:
-    path = tmp_path / "a.npy"
-    np.save(path, np.zeros((4, 4, 4), np.float32))
-    with pytest.raises(clfractal.SceneError, match="are not joined to a grid from a file") as caught:
-        scene_of({"egg": EVERY_JOIN["egg"]}, file=str(path), resolution=64)
-    assert caught.value.where.path == "objects"
 
 
 def test_grids_do_not_leave_water_out_without_a_word() -> None:
