@@ -150,8 +150,6 @@ def shown_pictures(notebook: Any) -> list[Image.Image]:
 def test_the_notebook_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     nbclient = pytest.importorskip("nbclient")
     nbformat = pytest.importorskip("nbformat")
-    pytest.importorskip("ipykernel")
-    pytest.importorskip("skimage")
     # A kernel of this very Python, whatever kernels are installed; and nothing is kept in the user's folders.
     kernels = tmp_path / "jupyter" / "kernels" / "python3"
     kernels.mkdir(parents=True)
@@ -252,7 +250,6 @@ def pages() -> dict[str, list[str]]:
 @pytest.fixture(scope="module")
 def told(pages: dict[str, list[str]], tmp_path_factory: pytest.TempPathFactory) -> str:
     """What mypy says of the script and the pages, once for all: most of its time it reads NumPy's types."""
-    pytest.importorskip("mypy")
     folder = tmp_path_factory.mktemp("types")
     texts = {"script": SCRIPT + MISTAKES, **{name: "\n".join(lines) + "\n" for name, lines in pages.items()}}
     for name, text in texts.items():

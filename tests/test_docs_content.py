@@ -318,7 +318,6 @@ def test_the_table_of_settings() -> None:
 
 
 def test_every_gesture_of_the_help_is_told() -> None:
-    pytest.importorskip("imgui_bundle")
     from clfractal.viewer.panels.help import POINTER_ROWS
 
     page = (DOCS / "window.md").read_text(encoding="utf-8").lower()

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import importlib.util
 import signal
-import subprocess
 import time
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from clfractal.scene import given
 from clfractal.scene import load as load_module
 from clfractal.scene.load import load_scene
 from tests.calls import counted
-from tests.shell import InProcess, command, environment, python, works
+from tests.shell import InProcess, Running, python, works
 
 # Squaring quaternions without adding anything: inside is the unit ball, of which the slice is one, too.
 SCENE = """version: 1
@@ -322,16 +321,14 @@ def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
     """In the middle of the work, at once."""
     (tmp_path / "scene.yaml").write_text(SCENE)
     kind, side = ("voxelize", "600") if name.endswith("nrrd") else ("mesh", "700")
-    run = command(kind, "scene.yaml", "-o", name, "--resolution", side)
-    with subprocess.Popen(run, cwd=tmp_path, env=environment(), stderr=subprocess.PIPE, text=True) as running:
-        assert running.stderr is not None
-        assert "voxels need" in running.stderr.readline()
-        time.sleep(0.5)
-        start = time.monotonic()
-        running.send_signal(signal.SIGINT)
-        told = running.communicate(timeout=60)[1]
-        assert time.monotonic() - start < 1.5
-    assert running.returncode == 130, told  # 0: it was done before it was interrupted
+    running = Running(tmp_path, kind, "scene.yaml", "-o", name, "--resolution", side)
+    assert running.process.stderr is not None
+    assert "voxels need" in running.process.stderr.readline()
+    time.sleep(0.5)
+    start = time.monotonic()
+    status, told = running.ended_by(signal.SIGINT)
+    assert time.monotonic() - start < 1.5
+    assert status == 130, told  # 0: it was done before it was interrupted
     assert told.splitlines()[-1] == f"{name}: interrupted, nothing was written"
     assert [path.name for path in tmp_path.iterdir()] == ["scene.yaml"]
 

@@ -128,7 +128,6 @@ def test_grids_that_hold_little_are_told(
     ended = works(shell("voxelize", tmp_path / "ball.yaml", "-o", tmp_path / "a.nrrd"))
     assert [line for line in ended.err.splitlines() if f"ball.yaml: {remark}" in line] or not remark
     assert ("inside the set" in ended.err or "the volume" in ended.err) == bool(remark)
-    pytest.importorskip("skimage")
     if "inside" in remark:  # its faces are a surface
         assert clfractal.mesh(scene).remarks == found
         assert f"ball.yaml: {found[0]}" in shell("mesh", tmp_path / "ball.yaml", "-o", tmp_path / "a.ply").err
@@ -138,7 +137,6 @@ def test_grids_that_hold_little_are_told(
 
 
 def test_a_grid_of_nothing_but_nan_is_told(tmp_path: Path, shell: InProcess) -> None:
-    pytest.importorskip("skimage")
     np.save(tmp_path / "lost.npy", np.full((4, 4, 4), np.nan, np.float32))
     plain = {**BALL, "renderer": {"type": "volume", "file": "lost.npy"}}
     scene = clfractal.load_scene(plain, folder=tmp_path)
@@ -156,7 +154,6 @@ def test_a_grid_of_nothing_but_nan_is_told(tmp_path: Path, shell: InProcess) -> 
 
 
 def test_files_are_those_of_the_shell(ball: clfractal.Volume, tmp_path: Path, shell: InProcess) -> None:
-    pytest.importorskip("skimage")
     (tmp_path / "ball.yaml").write_text(clfractal.dump_scene(clfractal.load_scene(BALL)))
     assert shell("voxelize", tmp_path / "ball.yaml", "-o", tmp_path / "shell.nrrd").status == 0
     ball.save(tmp_path / "python.nrrd")
@@ -170,7 +167,6 @@ def test_files_are_those_of_the_shell(ball: clfractal.Volume, tmp_path: Path, sh
 
 
 def test_a_mesh_is_the_surface(ball: clfractal.Volume) -> None:
-    pytest.importorskip("skimage")
     parts: list[float] = []
     mesh = clfractal.mesh(BALL, progress=lambda stage, part: parts.append(part))
     assert mesh.normals is not None
@@ -189,7 +185,6 @@ def test_a_mesh_is_the_surface(ball: clfractal.Volume) -> None:
 
 
 def test_a_mesh_of_somebody_elses_volume() -> None:
-    pytest.importorskip("skimage")
     z, y, x = np.indices((20, 20, 20)) - 9.5
     volume = clfractal.Volume(np.sqrt(x * x + y * y + z * z), np.full(3, -9.5))
     found = clfractal.mesh(volume, level=6.0, close=False)
@@ -269,7 +264,6 @@ def test_counts_beyond_two_to_the_24th_are_exact(precision: str) -> None:
 
 
 def test_everything_goes_to_other_processes(ball: clfractal.Volume) -> None:
-    pytest.importorskip("skimage")
     twice = pickle.loads(pickle.dumps(ball))
     np.testing.assert_array_equal(twice.values, ball.values)
     assert (twice.origin == ball.origin).all()

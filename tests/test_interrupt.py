@@ -178,7 +178,6 @@ CALLS = {
 def test_every_call_hears_ctrl_c(tmp_path: Path) -> None:
     if not sees_host_writes(choose().info):
         pytest.skip("the device ends no launch early")
-    pytest.importorskip("skimage")
     code = (
         PRELUDE
         + "engine = clfractal.Engine()\nnoise = np.random.default_rng(1).random((400, 400, 400), np.float32)\n"

@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import random
 import signal
-import subprocess
 import sys
 import time
 from pathlib import Path
@@ -18,7 +17,7 @@ from clfractal.files.exr import read_exr
 from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows
 from tests.cluster.kills import kill_at_random
 from tests.interrupts import planes
-from tests.shell import Running, command, environment, process, wait_until, works
+from tests.shell import Running, process, wait_until, works
 
 resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")
 
@@ -177,17 +176,12 @@ def test_a_killed_client_is_resumed(folder: Path, farm: Farm, picture: dict[str,
 def test_a_full_disk(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
     """The system lets the client write no more than a part of its journal."""
     order = ["render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address, "--quiet"]
-    full = subprocess.run(
-        command(*order),
-        cwd=folder,
-        env=environment(),
-        capture_output=True,
-        text=True,
-        preexec_fn=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000)),
-        timeout=120,
+    limited = Running(
+        folder, *order, before=lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (600_000, 600_000))
     )
-    assert (full.returncode, full.stderr.count("\n")) == (2, 1), full
-    assert full.stderr.startswith("out.exr.partial: ")
+    status, told = limited.ended_by(seconds=120)
+    assert (status, told.count("\n")) == (2, 1), told
+    assert told.startswith("out.exr.partial: ")
     assert not (folder / "out.exr").exists()
     works(process([*order, "--resume"], folder))
     assert planes(folder / "out.exr") == picture

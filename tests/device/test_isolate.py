@@ -23,7 +23,7 @@ from clfractal.device.children import Children
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError, FormulaError, Stopped, UntriedError
-from tests.shell import SCENE, environment
+from tests.shell import SCENE, environment, has_bytes, wait_until
 
 _HERE = "tests.device.test_isolate"
 
@@ -63,12 +63,16 @@ def kill_job(request: dict[str, Any]) -> None:
     os.kill(os.getpid(), signal.SIGSEGV)
 
 
-def _run(device: Device, job: str, timeout_s: float = 60.0, **arguments: Any) -> Any:
-    return isolate.run(f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=timeout_s)
-
-
-def _run_stoppable(device: Device, job: str, stopped: Callable[[], bool], **arguments: Any) -> Any:
-    return isolate.run(f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=60, stopped=stopped)
+def _run(
+    device: Device,
+    job: str,
+    timeout_s: float = 60.0,
+    stopped: Callable[[], bool] | None = None,
+    **arguments: Any,
+) -> Any:
+    return isolate.run(
+        f"{_HERE}:{job}", device, arguments, doing="testing", timeout_s=timeout_s, stopped=stopped
+    )
 
 
 @pytest.fixture
@@ -93,13 +97,6 @@ def _is_running(process: int) -> bool:
     return state != "Z"
 
 
-def _wait(condition: Any) -> bool:
-    end = time.monotonic() + 30
-    while not condition() and time.monotonic() < end:
-        time.sleep(0.02)
-    return bool(condition())
-
-
 def test_a_value_comes_back_and_noise_does_not(device: Device, capfd: pytest.CaptureFixture[str]) -> None:
     number, process = _run(device, "echo_job", number=41)
     assert number == 42
@@ -117,13 +114,13 @@ def test_the_child_stays_for_the_next_job(device: Device, monkeypatch: pytest.Mo
     monkeypatch.setenv("CLFRACTAL_TEST_OTHER", "1")
     second = _run(device, "echo_job", number=4)[1]
     assert second != first
-    assert _wait(lambda: not _is_running(first))
+    wait_until(lambda: not _is_running(first))
 
 
 def test_a_child_that_ended_meanwhile_is_replaced(device: Device) -> None:
     process = _run(device, "echo_job", number=1)[1]
     os.kill(process, signal.SIGKILL)
-    assert _wait(lambda: not _is_running(process))
+    wait_until(lambda: not _is_running(process))
     assert _run(device, "echo_job", number=2)[0] == 3
 
 
@@ -157,7 +154,7 @@ def test_a_child_without_work_ends_by_itself(
     monkeypatch.setattr(subprocess, "Popen", impatient)
     process = _run(device, "echo_job", number=1)[1]
     assert _run(device, "echo_job", number=2) == [3, process]
-    assert _wait(lambda: not _is_running(process))
+    wait_until(lambda: not _is_running(process))
     assert _run(device, "echo_job", number=3)[0] == 4
 
 
@@ -199,7 +196,7 @@ def test_a_child_that_ended_by_itself_is_cleared_away(device: Device, pool: Chil
     process = _run(device, "echo_job", number=1)[1]
     assert _descriptors() == before + 2
     os.kill(process, signal.SIGKILL)
-    assert _wait(lambda: _descriptors() == before)
+    wait_until(lambda: _descriptors() == before)
 
 
 def test_no_process_can_be_started(device: Device, pool: Children, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -217,7 +214,7 @@ def test_an_interrupt_ends_the_child_and_frees_its_place(
         mark = tmp_path / f"mark{number}"
 
         def interrupt(mark: Path = mark) -> None:
-            _wait(lambda: mark.exists() and mark.read_text())
+            wait_until(has_bytes(mark, 0))
             os.kill(os.getpid(), signal.SIGINT)
 
         with ThreadPoolExecutor(1) as other:
@@ -239,14 +236,7 @@ def test_work_that_is_stopped(device: Device, pool: Children, tmp_path: Path) ->
         return mark.exists() and len(asked) > 20
 
     with pytest.raises(Stopped):
-        isolate.run(
-            f"{_HERE}:sleep_job",
-            device,
-            {"mark": str(mark)},
-            doing="testing",
-            timeout_s=60,
-            stopped=stopped,
-        )
+        _run(device, "sleep_job", stopped=stopped, mark=str(mark))
     assert statistics.median(b - a for a, b in itertools.pairwise(asked)) < 0.02
     assert not _is_running(int(mark.read_text()))
     assert _run(device, "echo_job", number=1)[0] == 2
@@ -258,14 +248,14 @@ def test_who_waits_for_a_child_can_be_stopped(device: Device, pool: Children, tm
 
     def sleep(mark: Path) -> None:
         with pytest.raises(Stopped):
-            _run_stoppable(device, "sleep_job", enough.is_set, mark=str(mark))
+            _run(device, "sleep_job", stopped=enough.is_set, mark=str(mark))
 
     with ThreadPoolExecutor(2) as threads:
         busy = [threads.submit(sleep, mark) for mark in marks]
-        assert _wait(lambda: all(mark.exists() and mark.read_text() for mark in marks))
+        wait_until(lambda: all(has_bytes(mark, 0)() for mark in marks))
         start = time.monotonic()
         with pytest.raises(Stopped):
-            _run_stoppable(device, "echo_job", lambda: time.monotonic() > start + 0.2, number=1)
+            _run(device, "echo_job", stopped=lambda: time.monotonic() > start + 0.2, number=1)
         assert time.monotonic() - start < 5
         enough.set()
         for each in busy:
@@ -349,12 +339,12 @@ def test_the_child_ends_with_its_parent(tmp_path: Path, end: signal.Signals) -> 
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     command = [sys.executable, "-c", _PARENT, str(mark)]
     parent = subprocess.Popen(command, cwd=Path(__file__).parents[2], env=environment)
-    assert _wait(lambda: mark.exists() and mark.read_text())
+    wait_until(has_bytes(mark, 0))
     process = int(mark.read_text())
     assert _is_running(process)
     parent.send_signal(end)
     assert parent.wait(20) == (130 if end == signal.SIGINT else -end)
-    assert _wait(lambda: not _is_running(process))
+    wait_until(lambda: not _is_running(process))
 
 
 # --- forked processes: OpenCL works in them if it was not used before ---

@@ -362,19 +362,20 @@ def test_a_space_with_a_time(space: str, tmp_path: Path) -> None:
     np.testing.assert_array_equal(found.origin, THEIR_ORIGIN * WITH_TIME[space])
 
 
-@pytest.mark.parametrize("space", ["", "space dimension: 3", "space: LPS\nspace dimension: 3"])
-def test_no_name_of_a_space(space: str, tmp_path: Path) -> None:
-    found = read_volume(written(tmp_path / "v.nrrd", space or "content: none"))
-    np.testing.assert_array_equal(found.directions, STEPS)
-    np.testing.assert_array_equal(found.origin, THEIR_ORIGIN)
-
-
-@pytest.mark.parametrize("space", ["3D-left-handed", "3d-LEFT-handed"])
-def test_a_left_handed_space_is_mirrored(space: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("space", "sign"),
+    [
+        ("content: none", 1),
+        ("space: LPS\nspace dimension: 3", 1),
+        ("space: 3D-left-handed", -1),
+        ("space: 3d-LEFT-handed", -1),
+    ],
+)
+def test_a_left_handed_space_is_mirrored_and_none_is_ours(space: str, sign: int, tmp_path: Path) -> None:
     """Positions have another sign along x, whichever way the axes of the array run; ours are right-handed."""
-    found = read_volume(written(tmp_path / "v.nrrd", f"space: {space}"))
-    np.testing.assert_array_equal(found.origin, THEIR_ORIGIN * [-1, 1, 1])
-    np.testing.assert_array_equal(found.directions, STEPS * [-1, 1, 1])
+    found = read_volume(written(tmp_path / "v.nrrd", space))
+    np.testing.assert_array_equal(found.origin, THEIR_ORIGIN * [sign, 1, 1])
+    np.testing.assert_array_equal(found.directions, STEPS * [sign, 1, 1])
 
 
 @pytest.mark.parametrize(
