@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import dataclasses
-import os
 import struct
-import subprocess
 import sys
 import time
 from concurrent.futures import ThreadPoolExecutor
@@ -176,7 +174,7 @@ def test_what_does_not_exist_is_told(there: pytest.MonkeyPatch, spec: str, messa
     assert "\n" not in str(caught.value)
 
 
-def test_no_device_at_all(tmp_path: Path) -> None:
+def test_no_device_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The wheel's loader looks in PYOPENCL_HOME as well, which pyopencl sets when it is imported."""
     code = (
         "import os, pyopencl; os.environ['PYOPENCL_HOME'] = os.environ['OCL_ICD_VENDORS']\n"
@@ -187,12 +185,8 @@ def test_no_device_at_all(tmp_path: Path) -> None:
         "    try: choose(spec)\n"
         "    except DeviceError as error: print(error.status, error)\n"
     )
-    environment = {**os.environ, "OCL_ICD_VENDORS": str(tmp_path)}
-    environment.pop(select.ENVIRONMENT_VARIABLE, None)
-    result = subprocess.run(
-        [sys.executable, "-c", code], env=environment, capture_output=True, text=True, check=True
-    )
-    lines = result.stdout.splitlines()
+    monkeypatch.delenv(select.ENVIRONMENT_VARIABLE, raising=False)
+    lines = works(python(code, extra={"OCL_ICD_VENDORS": str(tmp_path)})).out.splitlines()
     assert len(lines) == 4
     assert all(line.startswith("3 no OpenCL device; install a driver") for line in lines)
     assert all("pip install pocl-binary-distribution" in line for line in lines)
