@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from clfractal.device.select import choose, has_float64
+from tests.devices import check_usable
 from tests.makers import DOCS, maker, pictured
 
 
@@ -210,8 +210,7 @@ def test_errors_on_a_ball(normal: str) -> None:
 
 
 def test_errors_on_the_mandelbulb() -> None:
-    if not has_float64(choose().info):
-        return  # nothing true to compare with
+    check_usable("float64")  # or there is nothing true to compare with
     true, whole = maker("make_normals").true_normals(SIZE)
     assert whole.mean() > 0.9
     table = printed("On the Mandelbulb")

@@ -14,11 +14,12 @@ import pytest
 from numpy.linalg import norm
 
 import clfractal
-from clfractal.device.select import choose, has_float64
+from clfractal.device.structs import Precision
 from clfractal.files.file_kinds import Kind, kind_of
 from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_volume
 from clfractal.scene.grid_values import finite_range, in_words, is_finite_somewhere, lacking
 from tests.calls import raising
+from tests.devices import check_usable
 from tests.shell import SCENE, InProcess, works
 
 # z stays where it is: the set is the ball of the bailout's radius, 0.8 around the origin.
@@ -213,9 +214,8 @@ def test_a_shown_file_is_not_replaced(ball: clfractal.Volume, tmp_path: Path) ->
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-def test_distances_to_a_ball(precision: str) -> None:
-    if precision == "float64" and not has_float64(choose().info):
-        pytest.skip("the device has no float64")
+def test_distances_to_a_ball(precision: Precision) -> None:
+    check_usable(precision)
     points = np.array([[2.0, 0, 0], [0, -1.0, 0], [0.1, 0.2, 0.3], [1.0, 2.0, -2.0]])
     found = clfractal.distances(BALL["formula"], points, iterations=2, precision=precision)  # type: ignore[arg-type]
     np.testing.assert_allclose(found.full, [1.2, 0.2, 0, 2.2], atol=1e-6)
@@ -248,9 +248,8 @@ def counting(target: int, digit: int) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
-def test_counts_beyond_two_to_the_24th_are_exact(precision: str) -> None:
-    if precision == "float64" and not has_float64(choose().info):
-        pytest.skip("the device has no float64")
+def test_counts_beyond_two_to_the_24th_are_exact(precision: Precision) -> None:
+    check_usable(precision)
     target, digit = 4200, 4001
     exact = target * digit + 1  # odd, and above 2^24
     assert exact % 2 == 1

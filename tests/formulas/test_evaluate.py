@@ -20,7 +20,7 @@ from clfractal.formulas.chain import Chain, single
 from clfractal.formulas.evaluate import TINY, as_function, evaluate, evaluate_constant
 from clfractal.formulas.language import Call, Name, Node, Number, parse
 from clfractal.formulas.opencl import write_formula
-from tests.devices import device, usable
+from tests.devices import check_usable, device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
 from tests.formulas.orbits import ORBITS
 from tests.formulas.rounding import spread
@@ -266,8 +266,7 @@ def shown(node: Node) -> str:
 
 @pytest.mark.parametrize("form", ["operations", "jacobian"])
 def test_random_expressions(form: str) -> None:
-    if not usable(PRECISION):
-        return
+    check_usable(PRECISION)
     faults, compared = [], 0
     unit = float(np.finfo(PRECISION).eps)
     for tree, got in zip(random_trees(), results(form), strict=True):

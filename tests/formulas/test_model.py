@@ -23,7 +23,7 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import BoundFormula, Parameter, bind, formula_from_mapping, to_text
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
-from tests.devices import device, usable
+from tests.devices import check_usable, device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
 from tests.formulas.orbits import FAR, ORBITS, STEPS, points_of, start_at
 from tests.formulas.rounding import spread
@@ -384,8 +384,7 @@ def oracle(chain: Chain, at: Floats, base: Any, steps: int = STEPS) -> Floats:
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("name", LIVE)
 def test_every_value_of_the_library(name: str, precision: Precision) -> None:
-    if not usable(precision):
-        return
+    check_usable(precision)
     unit = float(np.finfo(precision).eps)
     compared = 0
     for parameters, as_any in product(({}, *values_of(name)), (False, True)):
@@ -411,8 +410,7 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
 
 @pytest.mark.parametrize("power", [2, 5, 2.5, 8.0])
 def test_a_mandelbulb_against_forty_digits(power: float) -> None:
-    if not usable("float64"):
-        return
+    check_usable("float64")
     chain = catalog.load_chain(spec_of("mandelbulb", {"power": power}))
     at = points_of(chain)[:13]
     got = orbits("mandelbulb", {"power": power}, at, "float64")[:, :, 0]
@@ -433,8 +431,7 @@ factors = st.sampled_from([0.0, 1.0, -1.0, 0.5]) | st.floats(-2, 2).map(lambda v
 @given(p=exponents, q=factors)
 @settings(max_examples=60, deadline=None)
 def test_any_exponent(p: float, q: float) -> None:
-    if not usable("float64"):
-        return
+    check_usable("float64")
     parameters = {"p": round(p, 6), "q": q}
     chain = catalog.load_chain(spec_of("inline", parameters))
     with np.errstate(all="ignore"):

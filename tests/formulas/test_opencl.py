@@ -32,7 +32,7 @@ from clfractal.integrators import surface
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.points import program_text
 from clfractal.scene.load import load_scene
-from tests.devices import device, usable
+from tests.devices import check_usable, device
 from tests.formulas.opencl_batch import kernel_file, numbered
 from tests.formulas.orbits import FAR, SPECS, STEPS, chain_of, orbit, points_of, start_at, texts
 from tests.formulas.rounding import NoisyBackend, spread
@@ -116,8 +116,7 @@ def compare(got: Floats, expected: Floats, allowed: Floats, states: Floats, what
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("name", list(SPECS))
 def test_values(name: str, precision: Precision) -> None:
-    if not usable(precision):
-        return
+    check_usable(precision)
     states, _ = exact(name)
     allowed, _ = tolerance(name, precision)
     orbits = orbit(name, "operations", precision)
@@ -130,8 +129,7 @@ def test_values(name: str, precision: Precision) -> None:
 @pytest.mark.parametrize("form", ["operations", "jacobian"])
 @pytest.mark.parametrize("name", list(SPECS))
 def test_jacobians(name: str, form: str, precision: Precision) -> None:
-    if not usable(precision):
-        return
+    check_usable(precision)
     states, jacobians = exact(name)
     _, allowed = tolerance(name, precision)
     taken = [0, 1, STEPS]
@@ -177,8 +175,7 @@ WITH_RULE = [name for name in SPECS if "derivative_apply_0" in texts("operations
 @pytest.mark.parametrize("precision", PRECISIONS)
 @pytest.mark.parametrize("name", WITH_RULE)
 def test_scalar_rules(name: str, precision: Precision) -> None:
-    if not usable(precision):
-        return
+    check_usable(precision)
     states, _ = exact(name)
     expected = rule_orbit(name)
     allowed, _ = tolerance(name, precision)

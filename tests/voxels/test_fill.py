@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.device.select import Device, has_float64
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.tune import accepted_lanes
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from tests.calls import raising
-from tests.devices import device
+from tests.devices import check_usable, device
 from tests.voxels.grids import ROUNDED, differing_voxels, filled, inside, volume_scene, voxel_points
 
 
@@ -54,8 +54,7 @@ def test_every_lane_count_gives_the_same_grid() -> None:
 
 
 def test_float64() -> None:
-    if not has_float64(device().info):
-        return
+    check_usable("float64")
     precision: Precision = "float64"
     scene = volume_scene("hast", 20, resolution=48, box={"size": 2.6})
     check_inside(filled(scene, precision=precision), scene, 0)
