@@ -68,7 +68,7 @@ WRITTEN: dict[str, Write] = {name: write for name, (write, _) in READ.items() if
 
 
 def told(path: Path, read: Read) -> str:
-    """The line by which a file is refused, without its name; none if it is read."""
+    """The line by which a file is refused, without its name and place; none if it is read."""
     try:
         read(path)
     except FileError as error:
@@ -76,9 +76,9 @@ def told(path: Path, read: Read) -> str:
     else:
         return ""
     assert "\n" not in line
-    assert line.startswith(f"{path}: ")
+    assert line.startswith(f"{path}:")
     assert status == 2
-    return line.removeprefix(f"{path}: ")
+    return line.removeprefix(f"{path}:").partition(" ")[2]
 
 
 @pytest.mark.parametrize("name", READ)
@@ -131,8 +131,10 @@ def test_a_full_disk_leaves_the_earlier_file(name: str, tmp_path: Path) -> None:
     WRITTEN[name](path)
     before = {each.name: each.read_bytes() for each in tmp_path.iterdir()}
     size = path.stat().st_size
-    for limit in (100, 600, size // 2, size - 1):
-        with pytest.raises(FileError, match=f"{name}: cannot be written: ") as caught, file_size_limit(limit):
+    # (Beside an NPY there is a second file. Of a packed NRRD the last byte is not missed.)
+    for limit in (100, 600, size // 2, size - (16 if name == "packed.nrrd" else 1)):
+        message = rf"{name}(\.json)?: cannot be written: "
+        with pytest.raises(FileError, match=message) as caught, file_size_limit(limit):
             WRITTEN[name](path)
         assert ".tmp" not in str(caught.value)
         assert {each.name: each.read_bytes() for each in tmp_path.iterdir()} == before
