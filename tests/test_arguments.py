@@ -198,7 +198,7 @@ def test_a_section_that_is_made_by_hand_is_checked() -> None:
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"formula": "mandelbul"}, "unknown formula 'mandelbul'; did you mean 'mandelbulb'"),
+        ({"formula": "mandelbul"}, "name: unknown formula 'mandelbul'; did you mean 'mandelbulb'"),
         ({"parameters": {"powr": 3}}, "parameters.powr: "),
         ({"iterations": 1.5}, "iterations: must be"),
         ({"points": [0, 0, 0]}, "points: must have shape"),
