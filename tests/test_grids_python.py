@@ -18,7 +18,7 @@ from clfractal.device.structs import Precision
 from clfractal.files.file_kinds import Kind, kind_of
 from clfractal.files.volume_file import SCENE_KEY, Volume, read_volume, write_volume
 from clfractal.scene.grid_values import finite_range, in_words, is_finite_somewhere, lacking
-from tests.calls import raising
+from tests.calls import failure, raising
 from tests.devices import check_usable
 from tests.shell import SCENE, InProcess, works
 
@@ -286,13 +286,12 @@ def test_everything_goes_to_other_processes(ball: clfractal.Volume) -> None:
         error = getattr(clfractal, kind)("is wrong", details="a log", status=3)
         twin = pickle.loads(pickle.dumps(error))
         assert (type(twin), str(twin), twin.details, twin.status) == (type(error), "is wrong", "a log", 3)
-    with pytest.raises(clfractal.SceneError) as caught:
-        clfractal.load_scene(SCENE, overrides=["camera.fov=400"])
-    twin = pickle.loads(pickle.dumps(caught.value))
+    error = failure(clfractal.SceneError, clfractal.load_scene, SCENE, overrides=["camera.fov=400"])
+    twin = pickle.loads(pickle.dumps(error))
     assert (str(twin), twin.where, twin.message) == (
-        str(caught.value),
-        caught.value.where,
-        caught.value.message,
+        str(error),
+        error.where,
+        error.message,
     )
     assert isinstance(pickle.loads(pickle.dumps(clfractal.Stopped())), clfractal.Stopped)
 

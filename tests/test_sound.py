@@ -18,6 +18,7 @@ import clfractal
 from clfractal.engine.loudness import Shaping, loudness, shaped
 from clfractal.files.columns import read_columns
 from clfractal.files.sound import Sound, read_sound
+from tests.calls import failure
 from tests.shell import InProcess
 
 SCENE = None  # of these tests each writes its own
@@ -159,9 +160,7 @@ DAMAGED = {
 @pytest.mark.parametrize("content", DAMAGED)
 def test_damaged_files(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.wav").write_bytes(content)
-    with pytest.raises(clfractal.FileError) as caught:
-        read_sound(tmp_path / "a.wav")
-    assert DAMAGED[content] in caught.value.message
+    assert DAMAGED[content] in failure(clfractal.FileError, read_sound, tmp_path / "a.wav").message
 
 
 @given(st.binary(max_size=200))

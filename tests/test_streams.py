@@ -11,6 +11,7 @@ import pytest
 
 import clfractal
 from clfractal.cli.progress import shown_rate
+from tests.calls import failure
 from tests.shell import SCENE, Ended, environment, process
 
 posix = pytest.mark.skipif(os.name != "posix", reason="the shell of this system cannot close streams")
@@ -94,9 +95,7 @@ def test_errors_of_files_that_a_scene_names_keep_their_line(here: Path) -> None:
     head = "NRRD0004\ntype: uint8\ndimension: 3\nsizes: 4 four 4\nencoding: raw\n\n"
     (here / "scan.nrrd").write_text(head)
     (here / "volume.yaml").write_text(SCENE + "renderer: {type: volume, file: scan.nrrd}\n")
-    with pytest.raises(clfractal.FileError) as caught:
-        clfractal.load_scene(here / "volume.yaml")
-    assert str(caught.value).endswith(
+    assert str(failure(clfractal.FileError, clfractal.load_scene, here / "volume.yaml")).endswith(
         ": renderer.file: " + f"{here}/scan.nrrd:4: sizes: must be 3 whole numbers, got '4 four 4'"
     )
     (here / "scan.nrrd").write_text("NRRD0004\n")

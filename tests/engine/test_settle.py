@@ -13,6 +13,7 @@ from clfractal.camera.views import seen_by
 from clfractal.device.select import Device
 from clfractal.engine.settle import HIGHLIGHT, exposure_of, is_settled
 from clfractal.scene.parts import PerspectiveCamera
+from tests.calls import failure
 from tests.render.shots import BALL, BALL_RADIUS, SOLIDS, engine_of
 from tests.scenes import scene_of
 
@@ -80,9 +81,7 @@ def test_a_pinhole_needs_no_look() -> None:
 
 def test_focus_and_distance_contradict() -> None:
     message = "camera.focus_on: measures the distance that is sharp; remove it, or focus_distance"
-    with pytest.raises(clfractal.SceneError) as caught:
-        ball(focus_on=[0.5, 0.5], focus_distance=2)
-    assert str(caught.value).endswith(message)
+    assert str(failure(clfractal.SceneError, ball, focus_on=[0.5, 0.5], focus_distance=2)).endswith(message)
 
 
 def test_views_of_a_layout_have_their_own_focus(engine: clfractal.Engine) -> None:

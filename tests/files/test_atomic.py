@@ -19,7 +19,7 @@ from clfractal.files.exr import library_name, read_exr, write_exr
 from clfractal.files.exr_header import read_header
 from clfractal.files.texture import read_texture
 from clfractal.files.watching import INTERVAL, Watched
-from tests.calls import counted, raising
+from tests.calls import counted, failure, raising
 from tests.files.limits import file_size_limit
 from tests.shell import InProcess, process
 
@@ -121,11 +121,9 @@ def test_check_tells_what_is_wrong(tmp_path: Path) -> None:
         "a\0b.png": "cannot be written: ",
     }
     for name, message in cases.items():
-        with pytest.raises(FileError) as caught:
-            check_output(f"{tmp_path}/{name}")
-        assert caught.value.message.startswith(message.strip()), name
-        assert caught.value.where.file == f"{tmp_path}/{name}"
-        assert caught.value.status == 2
+        error = failure(FileError, check_output, f"{tmp_path}/{name}")
+        assert error.message.startswith(message.strip()), name
+        assert error.where.file == f"{tmp_path}/{name}"
 
 
 def test_check_follows_links(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -174,9 +172,7 @@ def test_reading_never_waits_for_a_pipe_or_reads_a_device(tmp_path: Path) -> Non
         str(tmp_path / "gone"): "cannot be read: No such file or directory",
         "a\0b": "cannot be read: ",
     }.items():
-        with pytest.raises(FileError) as caught:
-            open_regular(path)
-        assert caught.value.message.startswith(message.strip())
+        assert failure(FileError, open_regular, path).message.startswith(message.strip())
 
 
 def test_a_disk_that_fails_late_is_noticed(target: Path, monkeypatch: pytest.MonkeyPatch) -> None:

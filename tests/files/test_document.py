@@ -15,12 +15,11 @@ from clfractal.errors import FileError, FormulaError, SceneError, Where
 from clfractal.files.document import MAX_NODES, read_document, read_value, write_document
 from clfractal.files.marks import dotted, split_path
 from clfractal.files.regular import MAX_BYTES, read_bytes, read_text_file
+from tests.calls import failure
 
 
 def error_of(text: str) -> str:
-    with pytest.raises(SceneError) as caught:
-        read_document(text, "a.yaml")
-    return str(caught.value)
+    return str(failure(SceneError, read_document, text, "a.yaml"))
 
 
 @pytest.mark.parametrize(
@@ -214,9 +213,7 @@ class TestFiles:
         with pytest.raises(FileError, match="is too large: 11 bytes, at most 10"):
             read_text_file(path, limit=10)
         path.write_bytes(b"a\nb\xff")
-        with pytest.raises(FileError) as caught:
-            read_text_file(path, name="shown")
-        assert str(caught.value) == "shown:2: is not UTF-8 text"
+        assert str(failure(FileError, read_text_file, path, name="shown")) == "shown:2: is not UTF-8 text"
 
 
 # --- merges ---
@@ -264,9 +261,7 @@ def test_an_error_in_what_was_merged_is_where_it_was_written() -> None:
     ],
 )
 def test_what_cannot_be_merged(text: str, message: str) -> None:
-    with pytest.raises(SceneError) as caught:
-        read_document(text, "s")
-    assert message in str(caught.value)
+    assert message in str(failure(SceneError, read_document, text, "s"))
 
 
 def test_merges_count_for_what_they_repeat() -> None:

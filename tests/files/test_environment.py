@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from clfractal.errors import FileError
 from clfractal.files.environment_map import BRIGHTEST, read_environment
 from clfractal.files.exr import write_exr
+from tests.calls import failure
 
 Pixels = npt.NDArray[Any]
 
@@ -53,10 +54,7 @@ def with_primaries(path: Path, pixels: Pixels, chromaticities: tuple[float, ...]
 
 def refusal(path: Path) -> str:
     """The one line that a file is refused with, after its name."""
-    with pytest.raises(FileError) as caught:
-        read_environment(path)
-    text = str(caught.value)
-    assert "\n" not in text
+    text = str(failure(FileError, read_environment, path))
     assert text.startswith(f"{path}: ")
     return text.removeprefix(f"{path}: ")
 
@@ -414,9 +412,7 @@ def test_colours(tmp_path: Path) -> None:
 def test_refused(tmp_path: Path, head: str, size: str, cut: int, message: str) -> None:
     path = write_radiance(tmp_path / "a.hdr", random_rows(4, 8), head=head, size=size)
     path.write_bytes(path.read_bytes()[: -cut or None])
-    with pytest.raises(FileError) as caught:
-        read_environment(path)
-    assert str(caught.value) == f"{path}: {message}"
+    assert str(failure(FileError, read_environment, path)) == f"{path}: {message}"
 
 
 @settings(max_examples=200, deadline=None)

@@ -16,6 +16,7 @@ import pytest
 
 from clfractal.errors import FileError
 from clfractal.files.journal import MAGIC, SIDE, Journal
+from tests.calls import failure
 from tests.files.journals import CHANNELS, COUNT, IDENTITY, content
 from tests.files.limits import file_size_limit
 
@@ -142,9 +143,10 @@ def test_other_work_is_refused_with_what_differs(
 ) -> None:
     path = filled(tmp_path / "a.partial", range(3))
     before = path.read_bytes()
-    with pytest.raises(FileError) as caught:
-        Journal.resume(path, {**IDENTITY, **change}, CHANNELS, COUNT)
-    assert str(caught.value) == f"{path}: cannot be resumed: {message}"
+    assert (
+        str(failure(FileError, Journal.resume, path, {**IDENTITY, **change}, CHANNELS, COUNT))
+        == f"{path}: cannot be resumed: {message}"
+    )
     assert path.read_bytes() == before
 
 
@@ -185,9 +187,7 @@ def test_folders_pipes_and_missing_folders(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "pipe")
     for path in (tmp_path, tmp_path / "pipe", tmp_path / "gone" / "a.partial"):
         for begin in (Journal.create, Journal.resume):
-            with pytest.raises(FileError) as caught:
-                begin(path, IDENTITY, CHANNELS, COUNT)
-            assert str(caught.value).startswith(f"{path}: ")
+            assert str(failure(FileError, begin, path, IDENTITY, CHANNELS, COUNT)).startswith(f"{path}: ")
 
 
 def test_full_disk_keeps_what_was_written(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from clfractal.formulas.chain import Chain
 from clfractal.formulas.language import BoundFormula, Parameter, bind, formula_from_mapping, to_text
 from clfractal.formulas.opencl import FormulaText, write_formula
 from clfractal.formulas.reference import apply, constant_of, mp_orbit
+from tests.calls import failure
 from tests.devices import check_usable, device
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
 from tests.formulas.orbits import FAR, ORBITS, STEPS, points_of, start_at
@@ -59,11 +60,9 @@ def bound(parameters: dict[str, Any] | None = None, **more: Any) -> BoundFormula
 
 def refused(call: Callable[[], object], path: str, words: str) -> None:
     """With one line that says where."""
-    with pytest.raises(FormulaError) as caught:
-        call()
-    assert words in caught.value.message
-    assert caught.value.where.path == path
-    assert "\n" not in str(caught.value)
+    error = failure(FormulaError, call)
+    assert words in error.message
+    assert error.where.path == path
 
 
 def test_numbers_follow_from_parameters() -> None:
@@ -178,9 +177,7 @@ def test_a_wrong_parameter_is_one_located_error(parameters: dict[str, Any], path
     ],
 )
 def test_parameters_that_give_no_meaning_are_refused(changes: dict[str, Any], words: str) -> None:
-    with pytest.raises(FormulaError) as caught:
-        bind(formula(**changes))
-    assert words in caught.value.message
+    assert words in failure(FormulaError, lambda: bind(formula(**changes))).message
 
 
 def test_a_division_guarded_by_where_is_allowed() -> None:
@@ -192,9 +189,7 @@ def test_a_julia_constant_replaces_the_point() -> None:
     assert (f.add, f.julia) == ("constant", (0.1, 0.2, 0.3))
     assert f.center == (0.0, 0.0, 0.0)
     for wrong in ([0.1, 0.2], "abc", [0, 0, None], [0, 0, 1e9], [0, 0, float("nan")]):
-        with pytest.raises(FormulaError) as caught:
-            bound(julia=wrong)
-        assert (caught.value.where.path or "").startswith("formula.julia")
+        assert (failure(FormulaError, bound, julia=wrong).where.path or "").startswith("formula.julia")
     with pytest.raises(FormulaError, match="no Julia sets"):
         bind(catalog.load("menger_sponge"), julia=[0, 0, 0])
     with pytest.raises(FormulaError, match="needs a julia constant of 3 numbers"):
