@@ -23,6 +23,7 @@ from clfractal.device.children import Children
 from clfractal.device.program import build, math_flags
 from clfractal.device.select import Device
 from clfractal.errors import DeviceError, FormulaError, Stopped, UntriedError
+from tests.calls import failure
 from tests.shell import SCENE, environment, has_bytes, wait_until
 
 _HERE = "tests.device.test_isolate"
@@ -272,10 +273,8 @@ def test_a_build_that_is_stopped(device: Device, empty_cache: Path) -> None:
 
 
 def test_our_errors_pass_through(device: Device) -> None:
-    with pytest.raises(FormulaError, match=r"^wrong formula$") as caught:
-        _run(device, "raise_job")
-    assert caught.value.status == 2
-    assert caught.value.details == "why"
+    error = failure(FormulaError, _run, device, "raise_job")
+    assert (str(error), error.details) == ("wrong formula", "why")
 
 
 def test_a_failing_job_shows_its_cause_in_the_details(device: Device) -> None:

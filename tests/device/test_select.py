@@ -161,18 +161,15 @@ def test_the_environment_variable_counts_less_than_the_flag(there: pytest.Monkey
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
-        ("quantum", r"^unknown device 'quantum'; available: 0:0 pthread-Some Processor \(Portable"),
-        ("NVIDA", r"^unknown device 'NVIDA'; did you mean 'NVIDIA', in 0:0 pthread-Some"),
-        ("7:0", r"^no device '7:0'; available: 0:0 pthread"),
-        ("accelerator", r"^no device 'accelerator'; available: 0:0 pthread"),
+        ("quantum", "unknown device 'quantum'; available: 0:0 pthread-Some Processor (Portable"),
+        ("NVIDA", "unknown device 'NVIDA'; did you mean 'NVIDIA', in 0:0 pthread-Some"),
+        ("7:0", "no device '7:0'; available: 0:0 pthread"),
+        ("accelerator", "no device 'accelerator'; available: 0:0 pthread"),
     ],
 )
 def test_what_does_not_exist_is_told(there: pytest.MonkeyPatch, spec: str, message: str) -> None:
     _let_there_be(there, _POCL, _GPU)
-    with pytest.raises(DeviceError, match=message) as caught:
-        choose(spec)
-    assert caught.value.status == 2
-    assert "\n" not in str(caught.value)
+    assert str(failure(DeviceError, choose, spec)).startswith(message)
 
 
 def test_no_device_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.language import Call, Name, Node, Number, parse, to_text
+from tests.calls import failure
 from tests.formulas.trees import any_tree
 
 X, Y = Name("x"), Name("y")
@@ -20,12 +21,10 @@ def tree(text: str | int | float) -> Node:
     return parse(text, names=["x", "y", "z"], where=Where(path="map.0"))
 
 
-def failure(text: object) -> FormulaError:
-    with pytest.raises(FormulaError) as caught:
-        parse(text, names=["x", "y", "z"], where=Where(path="map.0"))  # type: ignore[arg-type]
-    assert "\n" not in str(caught.value)
-    assert caught.value.where.path == "map.0"
-    return caught.value
+def wrong(text: object) -> FormulaError:
+    error = failure(FormulaError, parse, text, names=["x", "y", "z"], where=Where(path="map.0"))
+    assert error.where.path == "map.0"
+    return error
 
 
 def assert_parses_or_fails_cleanly(text: str) -> None:
@@ -182,7 +181,7 @@ def test_random_tokens_raise_only_formula_errors(text: str) -> None:
     ],
 )
 def test_everything_else_is_one_located_line(text: str, words: str, column: int | None) -> None:
-    error = failure(text)
+    error = wrong(text)
     assert words in error.message
     if column is not None:
         assert error.where.column == column
@@ -192,14 +191,14 @@ def test_everything_else_is_one_located_line(text: str, words: str, column: int 
 
 @pytest.mark.parametrize("text", ["x2 y", "2e3 +* x", "x1y +", "1.5e-3 y"])
 def test_a_product_is_not_suggested_where_none_is_meant(text: str) -> None:
-    assert "2*x" not in failure(text).message
+    assert "2*x" not in wrong(text).message
 
 
 @pytest.mark.parametrize(
     "value", [True, False, None, [1], {"a": 1}, 1j, math.nan, math.inf, 10**400, b"x", object()]
 )
 def test_values_that_are_no_expression(value: object) -> None:
-    failure(value)
+    wrong(value)
 
 
 def test_log2_is_for_parameters() -> None:
