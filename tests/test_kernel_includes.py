@@ -45,8 +45,8 @@ _NAME = re.compile(r"(?<![\w.])(?<!->)([A-Za-z_]\w*)(\s*\()?")
 
 
 def texts() -> dict[str, str]:
-    """The text of each file, without comments, by its path in the folder of texts."""
-    root = folder("texts")
+    """The text of each file, without comments, by its path in the folder of kernels."""
+    root = folder("kernels")
     return {
         path.relative_to(root).as_posix(): _COMMENT.sub(" ", path.read_text("utf-8"))
         for path in root.rglob("*.[ch]*")
@@ -54,7 +54,7 @@ def texts() -> dict[str, str]:
 
 
 def included(name: str, files: Mapping[str, str]) -> set[str]:
-    """The files that a file includes: a path beside it or from the folder of texts, or all files of a folder."""
+    """The files that a file includes: a path beside it or from the folder of kernels, or all files of a folder."""
     found: set[str] = set()
     for path in _INCLUDE.findall(files[name]):
         beside = (PurePosixPath(name).parent / path).as_posix()
