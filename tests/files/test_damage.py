@@ -24,7 +24,7 @@ from tests.files.limits import file_size_limit, rewrite
 
 SCENE = "version: 1\nformula: {name: hast}\n# Grüße\n"
 TEXTS = {"clfractal": SCENE}
-SIZE = {"width": 80, "height": 40}
+SIZE: dict[str, Any] = {"width": 80, "height": 40}
 PIXELS = np.random.default_rng(1).random((40, 80, 3), np.float32)
 PLANES = {name: np.ascontiguousarray(PIXELS[..., place]) for place, name in enumerate("RGB")}
 VOLUME = Volume(np.random.default_rng(2).normal(size=(8, 9, 10)), texts={"clfractal": "a\nb"})
@@ -49,7 +49,8 @@ def as_volume(path: Path) -> None:
     write_volume(path, VOLUME, compress=path.stem == "packed")
 
 
-Write, Read = Callable[[Path], None], Callable[[Path], Any]
+Write = Callable[[Path], None]
+Read = Callable[[Path], Any]
 READ: dict[str, tuple[Write, Read]] = {
     "a.exr": (as_rows, exr_header.read_scene_text),
     "map.exr": (as_rows, read_environment),

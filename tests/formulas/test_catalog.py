@@ -54,7 +54,7 @@ RANGES: list[tuple[str, Mapping[str, float]]] = [
     ("box_fold_quaternion", {"fold": 2, "offset": 1}),
     *(("polyhedral_ifs", {"order": o, "scale": 1.5, "face": 0.7, "edge": -0.4}) for o in (3, 4, 5)),
 ]
-JULIA = [
+JULIA: list[tuple[Any, Mapping[str, float]]] = [
     ({"name": name, "julia": julia}, {})
     for name in ("mandelbulb", "hast", "mandelbox", "burning_ship", "bristorbrot")
     for julia in ([0.1, 0.2, 0.3], [0.9, -0.7, 0.4], [-1.2, 0.0, 0.0])
