@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from dataclasses import dataclass, fields
+from typing import Any
 
 from clfractal.device.select import Device
 from clfractal.engine.canvas import Canvas
@@ -66,8 +67,10 @@ class Frame(Growth):
     @classmethod
     def of(cls, number: int, request: int, scene: Scene, job: Job, canvas: Canvas, growth: Growth) -> Frame:
         """The frame of what is on a canvas now."""
-        grown = (getattr(growth, each.name) for each in fields(growth))
-        return cls(*grown, number, request, scene, job, canvas, canvas.stamp)
+        grown: dict[str, Any] = {each.name: getattr(growth, each.name) for each in fields(growth)}
+        return cls(
+            **grown, number=number, request=request, scene=scene, job=job, canvas=canvas, stamp=canvas.stamp
+        )
 
     @property
     def is_draft(self) -> bool:

@@ -62,7 +62,7 @@ class Operators:
         self.chart_shown = False
         self.flying = False
         files = workspace.files
-        self._operators: dict[str, Callable[[], None]] = {
+        self._operators: dict[str, Callable[[], object]] = {
             **self.scene.operators,
             **self._film(),
             **{name: self._switch(part) for name, part in _PARTS.items()},

@@ -105,10 +105,10 @@ def _homogeneous(view: View, points: Floats, size: Size) -> tuple[Floats, Floats
 
 def _between(values: Floats, parts: Floats) -> Floats:
     """Values at both parts of the way from the first column to the second, shape (n, 2); exact at the ends."""
-    return cast(Floats, values[:, :1] * (1 - parts) + values[:, 1:] * parts)
+    return values[:, :1] * (1 - parts) + values[:, 1:] * parts
 
 
 def _middle_depth(view: View, depths: Floats) -> Floats:
     """The depth in the middle of a segment's picture: an eye sees the harmonic mean there."""
     start, end = depths[:, 0], depths[:, 1]
-    return cast(Floats, (start + end) / 2 if view.eye is None else 2 * start * end / (start + end))
+    return (start + end) / 2 if view.eye is None else 2 * start * end / (start + end)

@@ -6,7 +6,7 @@ A place in the picture is (x, y) in pixels from its upper left corner, y down; p
 
 from __future__ import annotations
 
-from typing import TypeAlias, cast
+from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
@@ -42,7 +42,7 @@ def point_at(view: View, x: float, y: float, size: Size, depth: float) -> Floats
     """The point, shape (3,), that a place of the picture shows at a finite depth."""
     origin, direction = ray_at(view, x, y, size)
     along = depth - (origin - view.origin) @ view.axis
-    return cast(Floats, origin + direction * (along / (direction @ view.axis)))
+    return origin + direction * (along / (direction @ view.axis))
 
 
 def project(view: View, point: npt.ArrayLike, size: Size) -> tuple[float, float, float]:

@@ -67,7 +67,7 @@ class SceneOperators:
         self._perspective: PerspectiveCamera | None = None
         self._kept: dict[str, Any] | None = None
         self._pivot: Vector | None = None
-        self.operators: dict[str, Callable[[], None]] = {
+        self.operators: dict[str, Callable[[], object]] = {
             **self._cameras(),
             **self._planes(),
             **self._stereo(),

@@ -133,7 +133,9 @@ def test_an_error_in_a_file_has_line_and_column(tmp_path: Path) -> None:
     told = str(failure(clfractal.FormulaError, catalog.resolve, {"file": "ball.yaml"}, tmp_path))
     assert told.startswith("ball.yaml:5:19: map.2: unknown name 'q'")
     path.write_text(BALL_FILE.replace("degree", "dgree"))
-    with pytest.raises(clfractal.FormulaError, match=r"ball.yaml:7:1: unknown key 'dgree'; did you mean 'degree'"):
+    with pytest.raises(
+        clfractal.FormulaError, match=r"ball.yaml:7:1: unknown key 'dgree'; did you mean 'degree'"
+    ):
         catalog.load_chain(path)
 
 

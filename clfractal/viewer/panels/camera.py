@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 from imgui_bundle import imgui
 
 from clfractal.scene.parts import PerspectiveCamera
@@ -29,7 +31,12 @@ def draw(ui: Ui) -> None:
     # A hundred points of a drag move the camera by its distance from what it looks at.
     places = {"step": 0.01 * length(minus(camera.target, camera.position))}
     size = "fov" if isinstance(camera, PerspectiveCamera) else "height"
-    options = {"fov": {"unit": "°"}, "position": places, "target": places, "up": {"step": 0.01}}
+    options: dict[str, Any] = {
+        "fov": {"unit": "°"},
+        "position": places,
+        "target": places,
+        "up": {"step": 0.01},
+    }
     w.fields(ui, "camera", (size, "position", "target", "up"), **options)
     _views(ui)
     if isinstance(camera, PerspectiveCamera):

@@ -101,7 +101,7 @@ def _dim(ui: Ui) -> Iterator[None]:
     """A window over everything, which keeps the pointer from what is below; a click on it closes the gallery."""
     kinds = imgui.WindowFlags_
     flags = kinds.no_scrollbar | kinds.no_scroll_with_mouse | kinds.no_nav
-    bare = {"window_padding": (0.0, 0.0), "window_border_size": 0.0, "window_rounding": 0.0}
+    bare: dict[str, Any] = {"window_padding": (0.0, 0.0), "window_border_size": 0.0, "window_rounding": 0.0}
     with (
         theme.colors(window_bg=(0.02, 0.022, 0.028, 0.72)),
         theme.window("gallery.dim", (0.0, 0.0), ui.size, flags=flags, **bare),

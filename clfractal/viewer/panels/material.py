@@ -51,9 +51,9 @@ def _lighting(ui: Ui) -> None:
 def summary(ui: Ui) -> str:
     """For the heading of the surroundings."""
     scene = ui.studio.scene
-    light, fog, glow = scene.environment, scene.fog is not None and "fog", scene.glow is not None and "glow"
+    light, fog, glow = scene.environment, scene.fog and "fog", scene.glow and "glow"
     source = light is not None and (light.name or ("sky" if light.sky is not None else "map"))
-    return ", ".join(filter(None, (source, fog, glow)))
+    return ", ".join(each for each in (source, fog, glow) if each)
 
 
 def _glow(ui: Ui, radius: float) -> None:

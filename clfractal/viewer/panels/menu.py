@@ -66,8 +66,8 @@ def draw(ui: Ui) -> None:
         for number, group in enumerate(_GROUPS):
             if number:
                 _gap()
-            for place, button in enumerate(group):
-                if place:
+            for index, button in enumerate(group):
+                if index:
                     w.in_row(2)
                 _button(ui, button)
 
