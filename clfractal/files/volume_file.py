@@ -165,7 +165,7 @@ def write_slabs(
     directions = np.asarray(place.directions, np.float64)
     with ExitStack() as stack:
         beside = stack.enter_context(atomic_writer(path))
-        stream = stack.enter_context(open(beside, "wb", buffering=0))
+        stream = stack.enter_context(open(beside, "wb"))
         if _format(path) == "npy":
             np.lib.format.write_array_header_1_0(
                 stream, {"descr": stored.str, "fortran_order": False, "shape": tuple(shape)}
@@ -230,8 +230,7 @@ def _write_values(
         for start in range(0, len(plain), _PIECE):
             piece = memoryview(plain[start : start + _PIECE])
             waiting += len(piece)
-            while len(piece):  # an unbuffered file may write less than it is given
-                piece = piece[stream.write(piece) :]
+            stream.write(piece)
             if waiting >= _FLUSHED:
                 flush(stream.fileno())
                 waiting = 0
