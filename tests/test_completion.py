@@ -148,8 +148,9 @@ def test_devices_as_json(clf: InProcess) -> None:
     assert len([each for each in found if each["default"]]) == 1
     head, *table = clf("devices").out.splitlines()
     assert head.split() == ["index", "name", "platform", "memory", "float64", "GL", "lanes", "speed"]
+    # (Which of several that is: other tests measure speeds meanwhile.)
+    assert len([line for line in table if line.startswith("*")]) == 1
     for line, each in zip(table, found, strict=True):
-        assert line.startswith("*") == each["default"]
         assert each["index"] in line
         assert each["name"] in line
         assert f"{each['memory'] / 2**30:.1f} GiB" in line

@@ -1,4 +1,4 @@
-"""What the lists of commands share: the Typer application, how a command is made, and options that several have.
+"""What lists of commands share: the Typer application, how a command is made, options that several have.
 
 Each command's work is imported when it is called.
 """

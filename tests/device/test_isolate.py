@@ -234,7 +234,7 @@ def test_work_that_is_stopped(device: Device, pool: Children, tmp_path: Path) ->
 
     def stopped() -> bool:
         asked.append(time.monotonic())
-        return mark.exists() and len(asked) > 20
+        return len(asked) > 20 and mark.exists() and mark.read_text() != ""
 
     with pytest.raises(Stopped):
         _run(device, "sleep_job", stopped=stopped, mark=str(mark))

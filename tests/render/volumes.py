@@ -155,6 +155,6 @@ def check_ball(
     assert clear.sum() > 200
     expected = origin + np.where(clear, t, 0)[..., None] * direction
     assert np.linalg.norm(points_of(framebuffer) - expected, axis=-1)[clear].max() < 0.15 * voxel
-    outward = points_of(framebuffer) - center
-    cosine = ((normals_of(framebuffer) * outward).sum(-1) / np.linalg.norm(outward, axis=-1))[clear]
+    outward = (points_of(framebuffer) - center)[clear]
+    cosine = (normals_of(framebuffer)[clear] * outward).sum(-1) / np.linalg.norm(outward, axis=-1)
     assert np.degrees(np.arccos(np.minimum(cosine, 1))).max() < degrees

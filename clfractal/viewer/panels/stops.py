@@ -1,4 +1,4 @@
-"""Stops of palettes and transfer functions: dragged, added and removed on a strip or a graph, and its colours."""
+"""Stops of palettes and transfer functions: dragged, added and removed on a strip or a graph."""
 
 from __future__ import annotations
 
