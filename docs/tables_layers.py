@@ -71,7 +71,7 @@ def drawn_out(scales: Doubles) -> Doubles:
     last on what dielectrics reflect, of DRAWN_ROOTS reflectances.
 
     Args:
-        scales: of the two parts of that lobe, see `facets.py`; shape (2, ROUGHNESSES, COSINES).
+        scales: of the two parts of that lobe, see `tables_facets.py`; shape (2, ROUGHNESSES, COSINES).
     """
     found = np.ones((DRAWN_ROOTS + 3, ROUGHNESSES, DRAWN_STEPS, DRAWN_TURNS, DRAWN_COSINES + 1))
 

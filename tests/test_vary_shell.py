@@ -193,10 +193,11 @@ def test_files_that_the_scene_names_stay_reachable(clf: InProcess) -> None:
     assert ended.is_one_line(2, "maps/scene.yaml: uses 'sky.exr', which must")
 
 
-def test_textures_stay_reachable(clf: InProcess) -> None:
+@pytest.mark.parametrize("name", ["oak", "formula"])
+def test_textures_stay_reachable(clf: InProcess, name: str) -> None:
     Path("maps").mkdir()
     Image.new("RGB", (4, 4), (200, 100, 50)).save("maps/oak.png")
-    oak = "materials: {oak: {base: {color: {texture: oak.png}}}}\n"
-    Path("maps/scene.yaml").write_text(SCENE + oak)
+    material = f"materials: {{{name}: {{base: {{color: {{texture: oak.png}}}}}}}}\n"
+    Path("maps/scene.yaml").write_text(SCENE + material)
     works(clf("vary", "maps/scene.yaml", *SMALL, "--quiet"))
     assert list(clfractal.load_scene(Path("scene-01.yaml")).textures) == ["maps/oak.png"]

@@ -54,10 +54,10 @@ def render_one(
     """
     begun = time.perf_counter()
     header = job.header()
-    if resume:
-        job = continued(job, paths[0])
     work: AbstractContextManager[JobFramebuffers | Unfinished]
     if keep or 4 * job.region.pixels * len(job.channels) > _IN_MEMORY:
+        if resume:
+            job = continued(job, paths[0])
         work = Unfinished(job, header, paths[0], shell, resume=resume)
     else:
         work = nullcontext(JobFramebuffers(job))

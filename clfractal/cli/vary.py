@@ -236,8 +236,10 @@ class _Moved:
     def _renamed(self, data: dict[str, Any]) -> None:
         layout = data.get("layout") or {}
         for part in (data, *layout.get("views", ())):
-            for name in ("environment", "renderer", "lights", "materials", "objects"):
+            for name in ("environment", "renderer", "lights"):
                 rename_files(part.get(name), self._from_there)
+            for name in ("materials", "objects"):  # whose names are the user's
+                rename_files(list((part.get(name) or {}).values()), self._from_there)
 
     def _from_there(self, file: str) -> str:
         whole = (self.base / file).resolve()

@@ -151,9 +151,9 @@ def _move_plane(step: Step, renderer: CutPlaneRenderer, rng: Random, amount: flo
         "height": rounded(place.height, fine),
     }
     names = ("tilt", "twist", "zoom", "side", "up", "normal")
-    sizes = dict(zip(names, (tilt, twist, zoom, side, up, normal), strict=True))
+    sizes = zip(names, (tilt, twist, zoom, side, up, normal), strict=True)
     remark = f"plane {1 / factor:.2g}x, tilted {abs(_TILT * tilt):.0f}° and {abs(_TILT * twist):.0f}°"
-    step.add(Step({"renderer.plane": plane}, {f"plane.{name}": sizes[name] for name in names}, [remark]))
+    step.add(Step({"renderer.plane": plane}, {f"plane.{name}": each for name, each in sizes}, [remark]))
 
 
 def _half_height(camera: Camera) -> float:

@@ -12,7 +12,6 @@ import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
-from sys import intern
 from typing import Any, Literal
 
 from clfractal.formulas.costs import cost_of
@@ -113,6 +112,12 @@ class _Written:
         return FormulaText(self.text, tuple(constants) or (0.0,), self.facts)
 
 
+@lru_cache(maxsize=512)
+def _one(text: str) -> str:
+    """One object for equal texts, so that comparing them takes no time."""
+    return text
+
+
 @lru_cache(maxsize=64)
 def _written(asked: _Asked, scalar_rule: bool, dual_map: DualMap, leaf: Leaf | None) -> _Written:
     return _ChainWriter(asked.chain, scalar_rule, dual_map, leaf).write()
@@ -189,8 +194,7 @@ class _ChainWriter:
         )
         head = [facts.defines() + each_usual(1), state_functions(self.width)] if self.leaf is None else []
         return _Written(
-            # One object for equal texts, so that comparing them takes no time.
-            intern("\n".join([*head, *parts]) + "\n"),
+            _one("\n".join([*head, *parts]) + "\n"),
             facts,
             tuple(
                 (owner, as_function(node) if node is not None else None, slot in self.constants.strict)

@@ -12,10 +12,9 @@ from copy import copy
 from typing import Any, Literal
 
 import numpy as np
-import numpy.typing as npt
 
 from clfractal.images.develop import Development, developed
-from clfractal.images.modes import BELOW, BESIDE, PICKED, eye_size, is_second, picture_size
+from clfractal.images.modes import BELOW, BESIDE, PICKED, eye_size, picture_size
 from clfractal.images.tiled import Bands, Floats, Picture
 from clfractal.images.tiles import Region
 from clfractal.scene.stereo import APART as APART
@@ -23,6 +22,7 @@ from clfractal.scene.stereo import Mode, Stereo
 
 Side = Literal["left", "right"]
 Planes = Mapping[str, Floats]
+Place = tuple[slice, slice]
 
 # Of one eye's picture: a composed one has no camera of its own.
 _OF_AN_EYE = ("worldToCamera", "worldToNDC", "view")
@@ -58,8 +58,8 @@ def eye_regions(stereo: Stereo, image: tuple[int, int], region: Region) -> dict[
         first, second = (_part(region, 0, from_y, width, height) for from_y in (0, height))
     elif mode in PICKED:
         few = (min(region.height, 2), min(region.width, 2))  # rows and columns of every parity
-        seconds = _seconds(mode, (region.x, region.y), few)
-        first, second = (region if there else None for there in (not seconds.all(), seconds.any()))
+        places = _places(mode, (region.x, region.y), few)
+        first, second = (region if of_eye else None for of_eye in places)
     else:
         first = second = region
     if _swapped(stereo):
@@ -200,23 +200,43 @@ def _part(region: Region, from_x: int, from_y: int, width: int, height: int) -> 
     return Region(left, top, right - left, bottom - top) if right > left and bottom > top else None
 
 
-def _seconds(mode: Mode, origin: tuple[int, int], shape: tuple[int, ...]) -> npt.NDArray[np.bool_]:
-    """Which pixels of an array (rows, columns) that begins at the origin, x and y, are the second eye's."""
-    y, x = np.ogrid[origin[1] : origin[1] + shape[0], origin[0] : origin[0] + shape[1]]
-    return np.asarray(is_second(mode, x, y))
+def _places(mode: Mode, origin: tuple[int, int], shape: tuple[int, ...]) -> tuple[list[Place], list[Place]]:
+    """Where the first and the second eye's pixels are in an array (rows, columns) that begins at the origin, x and y.
+
+    The first eye's are those of even rows, columns, or sums of both.
+    """
+    x, y = origin
+    every, halves = slice(None), (slice(0, None, 2), slice(1, None, 2))
+    if mode == "rows":
+        places = [(halves[y % 2], every)], [(halves[1 - y % 2], every)]
+    elif mode == "columns":
+        places = [(every, halves[x % 2])], [(every, halves[1 - x % 2])]
+    else:
+        same = (x + y) % 2
+        places = (
+            [(halves[0], halves[same]), (halves[1], halves[1 - same])],
+            [(halves[0], halves[1 - same]), (halves[1], halves[same])],
+        )
+    first, second = ([place for place in of_eye if _holds_pixels(place, shape)] for of_eye in places)
+    return first, second
+
+
+def _holds_pixels(place: Place, shape: tuple[int, ...]) -> bool:
+    return all(len(range(*part.indices(length))) for part, length in zip(place, shape, strict=True))
 
 
 def _picked(stereo: Stereo, name: str, first: Planes, second: Planes, origin: tuple[int, int]) -> Floats:
     """One channel of a picture in which each pixel is one of either eye's."""
     result = np.empty_like((first or second)[name])
-    seconds = _seconds(stereo.mode, origin, result.shape)
+    places = _places(stereo.mode, origin, result.shape)
     colored = stereo.mode == "anaglyph_chessboard" and name in "RGB"
-    for planes, of_eye, color in zip((first, second), (~seconds, seconds), stereo.colors, strict=True):
+    for planes, of_eye, color in zip((first, second), places, stereo.colors, strict=True):
         passed = np.float32(color["RGB".index(name)] if colored else 1.0)
-        if passed == 0:  # a primary that a filter blocks is black, however bright it is
-            result[of_eye] = 0
-        elif of_eye.any():
-            np.multiply(planes[name], passed, out=result, where=of_eye)
+        for place in of_eye:
+            if passed == 0:  # a primary that a filter blocks is black, however bright it is
+                result[place] = 0
+            else:
+                np.multiply(planes[name][place], passed, out=result[place])
     return result
 
 

@@ -85,7 +85,9 @@ def own_errors(cls: Any) -> Iterator[None]:
 
 
 # Names of sections that are no part of the Python API.
-_FOR_OURSELVES = frozenset({"checked", "derived", "note_files", "once", "placed", "read_by", "tag", "whole"})
+_FOR_OURSELVES = frozenset(
+    {"checked", "derived", "note_files", "once", "placed", "read_by", "tag", "title", "whole"}
+)
 
 
 class Section(BaseModel, metaclass=_Kind):

@@ -22,8 +22,6 @@ from clfractal.viewer.measuring import Measuring
 from clfractal.viewer.operators import Operators
 from clfractal.viewer.own_screen import OwnScreen
 from clfractal.viewer.panels import all_panels, timeline_area
-from clfractal.viewer.panels.ui import Ui
-from clfractal.viewer.preparing import internal_error
 from clfractal.viewer.room import Room
 from clfractal.viewer.screenshots import Drawn
 from clfractal.viewer.settings import Settings
@@ -268,27 +266,10 @@ class Viewer(Workspace):
         self.room.fit(ui, alone=self.outputs.fills_screens)
         ui.speed = replace(self.meter.speed, way="shared" if self.surface.shared else "copied")
         self._draw_marks(scale)
-        self._draw_panels(ui)
+        all_panels.draw_safely(ui)
         imgui.render()
         if imgui.get_io().want_text_input or imgui.is_any_item_active():
             self._redraw = max(self._redraw, 1)
-
-    def _draw_panels(self, ui: Ui) -> None:
-        """A mistake in a panel costs that frame's panels, never the window."""
-        before = imgui.internal.ErrorRecoveryState()
-        imgui.internal.error_recovery_store_state(before)
-        try:
-            all_panels.draw(ui)
-        except Exception as error:
-            io = imgui.get_io()
-            asserts, io.config_error_recovery_enable_assert = io.config_error_recovery_enable_assert, False
-            logs, io.config_error_recovery_enable_debug_log = io.config_error_recovery_enable_debug_log, False
-            imgui.internal.error_recovery_try_to_recover_state(before)
-            io.config_error_recovery_enable_assert = asserts
-            io.config_error_recovery_enable_debug_log = logs
-            line = internal_error(error).message
-            if not any(message.text.startswith(line[:60]) for message in self.studio.messages[-5:]):
-                self.studio.tell(line, wrong=True)
 
     def _draw_marks(self, scale: float) -> None:
         scene = self.studio.shown_scene

@@ -140,7 +140,8 @@ class Autosave(_Held):
 
 @dataclass
 class Recovered(_Held):
-    """Unsaved changes of a window that has ended; they are kept by this one once they are discarded here.
+    """Unsaved changes of a window that has ended. They are discarded once they are given up, or once
+    this window keeps them.
 
     Attributes:
         time: when they were kept, seconds since 1970.

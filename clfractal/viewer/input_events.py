@@ -144,7 +144,8 @@ class Inputs:
         typed = KEYS.get(name.upper(), key) if name is not None else key
         work.renderer.keyboard_callback(work.window.handle, typed, scancode, action, mods)
         if action == RELEASE:
-            work.motion.keys -= {self._held.pop(key, None)}
+            if key in self._held:
+                work.motion.keys.discard(self._held.pop(key))
             return
         typing = io.want_text_input or keyboard.inside(work.ui)
         context: Context = "text" if typing else "fly" if self.operators.flying else "picture"

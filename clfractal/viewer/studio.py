@@ -139,16 +139,18 @@ class Studio(InFilm):
         A camera of another kind is refused, by a message, if a track moves what it does not have.
         """
         changed = self.scene.model_copy(update={"camera": camera})
-        try:
-            if type(camera) is not type(self.scene.camera):
+        if type(camera) is not type(self.scene.camera):
+            try:
                 check_tracked(self.scene, changed)
+            except ClfractalError as error:
+                self.tell(error.message, wrong=True)
+                return
+        try:
             changed = self._tied(changed)
-        except TrackedError as error:
-            self.tell(error.message, wrong=True)
         except ClfractalError as error:
             self.tell(f"camera: {error}", wrong=True)
-        else:
-            self._replace(changed, gesture)
+            return
+        self._replace(changed, gesture)
 
     def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
         """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""

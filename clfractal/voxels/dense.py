@@ -39,8 +39,8 @@ def grid_from_dense(
             becomes float32.
         device: where the grid shall be.
         place: where the voxels are; of the array's shape.
-        threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all. What is
-            above it counts as inside (a normal's fourth byte), or all.
+        threshold: bricks whose values are all at or below it cannot be seen and are not stored; None stores all. Values
+            above it count as inside (a normal's fourth byte); with None all do.
         normal_radius: of the low-pass filter before normals, voxels, 0 to 4.
         on_compile: told a line if the program has to be compiled first.
 

@@ -1,5 +1,5 @@
 // Paths through glass: what they carry while they are inside, and how they get there.
-// A place in the spectrum: the index of refraction there (`bend`, see `clfractal/shading/glass.py`), and what it weighs.
+// A place in the spectrum: the index of refraction there (`bend`, see `docs/tables_glass.py`), and what it weighs.
 INLINE color spectrum_at(real place, real *bend, __global const float *table) {
     scalar x[LANES], found[4 * LANES];
     lanes_store(place * (real)((scalar)SPECTRUM_PLACES), x);

@@ -3,17 +3,17 @@
 #define SMOOTHEST_FUZZ (R(1.0) / (real)((scalar)SMOOTHEST_FUZZ_PARTS))
 #define ALBEDO_ROW (ALBEDO_COSINES + 1)
 #define ALBEDO_TABLE (ALBEDO_ROUGHNESSES * ALBEDO_ROW)
-#define REPEATED_TABLES 4   // of metals, see `clfractal/shading/facets.py`
+#define REPEATED_TABLES 4   // of metals, see `docs/tables_facets.py`
 #define ALBEDO_FUZZ (REPEATED_TABLES * ALBEDO_TABLE)
 #define ALBEDO_DIELECTRIC (ALBEDO_FUZZ + ALBEDO_TABLE)
 // How much light visible facets reflect at most, and the mean and the spread of its cosine with them; colours of wavenumbers.
-// Their numbers are those of `clfractal/shading/spectrum.py`.
+// Their numbers are those of `docs/tables_spectrum.py`.
 #define WAVE_COUNT 48
 #define WAVE_SHORTEST_NM 380
 #define WAVE_LONGEST_NM 720
 #define WAVE_COLORS (ALBEDO_ALL - 3 * WAVE_COUNT)
 #define FACETS_MET (WAVE_COLORS - 3 * ALBEDO_TABLE)
-// With glass (`clfractal/shading/glass.py`): rough glass, seen from outside and from inside; wavelengths.
+// With glass (`docs/tables_glass.py`): rough glass, seen from outside and from inside; wavelengths.
 #define ALBEDO_GLASS ALBEDO_ALL   // behind all others
 #define ALBEDO_GLASS_INSIDE (ALBEDO_GLASS + ALBEDO_REFLECTANCES * ALBEDO_TABLE)
 #define SPECTRUM (ALBEDO_GLASS_INSIDE + ALBEDO_REFLECTANCES * ALBEDO_TABLE)

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from imgui_bundle import imgui
+from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.camera.views import scene_view
 from clfractal.files.document import read_document
@@ -20,7 +20,7 @@ from clfractal.stereo import eyes as geometry
 from clfractal.viewer import zoom_box
 from clfractal.viewer.actions import ACTIONS
 from clfractal.viewer.keys import KeyMap
-from clfractal.viewer.panels import all_panels, messages, overlay
+from clfractal.viewer.panels import all_panels, messages, overlay, theme
 from clfractal.viewer.panels import help as help_panel
 from clfractal.viewer.panels.ui import Speed, Ui
 from clfractal.viewer.studio import MESSAGE_SECONDS, Message
@@ -312,6 +312,29 @@ def test_messages_never_cover_a_dialog(size: tuple[int, int], monkeypatch: pytes
         assert apart or not above  # what does not fit beside it lies below
     if size == (1280, 720):
         assert all(above for above, _ in boxes)
+
+
+def test_a_mistake_in_a_panel_is_told_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As what it is, whatever was open around it; the other frames are drawn."""
+    draws = 0
+
+    def wrong(ui: Ui) -> None:
+        nonlocal draws
+        draws += 1
+        with theme.window("wrong", (0, 0), (100, 100)), imgui_ctx.push_id("a"), imgui_ctx.begin_child("##b"):
+            imgui.open_popup("c")
+            assert imgui.begin_popup("c")
+            raise LookupError("no such thing")
+
+    monkeypatch.setattr(messages, "draw", wrong)
+    ui = ui_of(BULB)
+    with headless():
+        Stage(ui, all_panels.draw_safely, window=False).frame()
+    assert draws == 3
+    assert [each.text for each in ui.studio.messages if "LookupError: no such thing" in each.text] == [
+        each.text for each in ui.studio.messages if each.wrong
+    ]
+    assert len([each for each in ui.studio.messages if each.wrong]) == 1
 
 
 def test_a_message_that_goes_asks_for_more_frames() -> None:

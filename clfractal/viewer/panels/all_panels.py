@@ -21,6 +21,7 @@ from clfractal.viewer.panels import (
     variations,
 )
 from clfractal.viewer.panels.ui import Ui
+from clfractal.viewer.preparing import internal_error
 
 
 def draw(ui: Ui) -> None:
@@ -44,6 +45,31 @@ def draw(ui: Ui) -> None:
     if boxes.refused:  # by a box whose panel has no place for it
         ui.studio.tell(boxes.refused, wrong=True)
         boxes.refused = ""
+
+
+def draw_safely(ui: Ui) -> None:
+    """The same; a mistake in a panel costs that frame's panels, never the window, and is told once."""
+    before = imgui.internal.ErrorRecoveryState()
+    imgui.internal.error_recovery_store_state(before)
+    try:
+        draw(ui)
+    except Exception as error:
+        io = imgui.get_io()
+        asserts, io.config_error_recovery_enable_assert = io.config_error_recovery_enable_assert, False
+        logs, io.config_error_recovery_enable_debug_log = io.config_error_recovery_enable_debug_log, False
+        imgui.internal.error_recovery_try_to_recover_state(before)
+        io.config_error_recovery_enable_assert = asserts
+        io.config_error_recovery_enable_debug_log = logs
+        line = internal_error(_mistake(error)).message
+        if not any(message.text.startswith(line[:60]) for message in ui.studio.messages[-5:]):
+            ui.studio.tell(line, wrong=True)
+
+
+def _mistake(error: Exception) -> Exception:
+    """What came first: blocks that were open complain that Dear ImGui has not closed what is in them."""
+    while "IM_ASSERT" in str(error) and isinstance(error.__context__, Exception):
+        error = error.__context__
+    return error
 
 
 CLOSE_MENU = "menu.close"

@@ -42,7 +42,8 @@ def _devices(ui: Ui) -> list[DeviceInfo]:
         return ui.kept("devices", devices)
     except ClfractalError as error:
         ui.studio.tell(str(error), wrong=True)
-        return ui.kept("devices", list[DeviceInfo])
+        ui.memory["devices"] = []
+        return []
 
 
 def _line(info: DeviceInfo, current: bool) -> bool:

@@ -122,7 +122,7 @@ def _reset(ui: Ui, each: Difference) -> None:
 def words(value: Any, most: int) -> str:
     """A plain value in few words."""
     if value is None or isinstance(value, bool):
-        text = {None: "none", True: "yes", False: "no"}[value]
+        text = "none" if value is None else "yes" if value else "no"
     elif isinstance(value, (int, float)):
         text = (f"{value:.5g}" if isinstance(value, float) else str(value)).replace("-", "\u2212")
     elif isinstance(value, str):

@@ -51,9 +51,11 @@ def _lighting(ui: Ui) -> None:
 def summary(ui: Ui) -> str:
     """For the heading of the surroundings."""
     scene = ui.studio.scene
-    light, fog, glow = scene.environment, scene.fog and "fog", scene.glow and "glow"
-    source = light is not None and (light.name or ("sky" if light.sky is not None else "map"))
-    return ", ".join(each for each in (source, fog, glow) if each)
+    parts = [name for name, part in (("fog", scene.fog), ("glow", scene.glow)) if part is not None]
+    light = scene.environment
+    if light is not None:
+        parts.insert(0, light.name or ("sky" if light.sky is not None else "map"))
+    return ", ".join(parts)
 
 
 def _glow(ui: Ui, radius: float) -> None:

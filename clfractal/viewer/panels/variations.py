@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -59,7 +60,7 @@ class Draw:
         self, base: Scene, strength: Strength, seed: int, kinds: frozenset[Kind], woken: Callable[[], None]
     ) -> None:
         self.kinds, self.woken = kinds, woken
-        self._drawn = candidates(base, strength=strength, seed=seed, kinds=kinds)
+        self._draw = partial(candidates, base, strength=strength, seed=seed, kinds=kinds)
         self.found: list[tuple[Variation, Scene]] = []
         self.problem = ""
         self.finished = self.stopped = False
@@ -72,7 +73,7 @@ class Draw:
 
     def _work(self) -> None:
         try:
-            for each in islice(self._drawn, COUNT + SPARES):
+            for each in islice(self._draw(), COUNT + SPARES):
                 if self.stopped:
                     return
                 self.found.append((each, small_scene(each.scene, *SIZE)))

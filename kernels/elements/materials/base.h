@@ -28,7 +28,7 @@ INLINE real fresnel_metal(real cosine, real straight, real tint) {
 INLINE color film_again(const bsdf *b);
 
 // f * cosine of a metal. Of light that is reflected more than once between its facets, `several`, the lobes have a direction: that of wider
-// facets. Their colour is what the first, the last and those between reflect; see `clfractal/shading/facets.py`.
+// facets. Their colour is what the first, the last and those between reflect; see `docs/tables_facets.py`.
 INLINE color metal_value(const bsdf *b, vec i, vec h, real single, real several, __global const float *tables) {
     const real meeting = vec_dot(b->out, h), wide = fmax(b->rough, (real)((scalar)REPEATED_NARROWEST_TENTHS * S(0.1)));
     const repeated o = specular_repeats(b, b->out, tables), other = specular_repeats(b, i, tables);
