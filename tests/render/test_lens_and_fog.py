@@ -10,6 +10,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.programs import compile_all
+from tests.render.sequence import unit_squares
 from tests.render.shots import (
     BALL_RADIUS,
     ORTHOGRAPHIC,
@@ -130,6 +131,7 @@ def fog_scene(
     camera: dict[str, Any] = PERSPECTIVE,
     background: Any = None,
     precision: str = "float32",
+    samples: int = 1,
 ) -> Scene:
     return scene_of(
         QUICK_BALL,
@@ -139,7 +141,7 @@ def fog_scene(
         material={"color": RED.tolist(), "ambient": 1, "diffuse": 0, "specular": 0},
         background=background or {"top": GREEN.tolist(), "bottom": GREEN.tolist()},
         fog={"color": MIST.tolist(), **fog},
-        renderer={"detail": 0.01, "precision": precision},
+        renderer={"detail": 0.01, "precision": precision, "samples": samples},
     )
 
 
@@ -172,6 +174,29 @@ def test_fog(
     misty = covered and density > 0
     behind = np.zeros_like(seen) if transparent else np.broadcast_to(MIST, seen.shape) if misty else sky
     np.testing.assert_allclose(seen[miss], behind[miss], atol=1e-6)
+
+
+@pytest.mark.parametrize("covered", [True, False])
+def test_fog_at_edges(device: Device, covered: bool) -> None:
+    """Every sample is fogged by itself; what is transparent stays so."""
+    density, samples = 0.5, 16
+    fog = {"density": density, "background": covered}
+    scene = fog_scene(fog, ORTHOGRAPHIC, "transparent", samples=samples)
+    framebuffer = shoot(scene, device)
+    expected, coverage = np.zeros((SIDE, SIDE, 3)), np.zeros((SIDE, SIDE))
+    across, below = unit_squares(SIDE, SIDE, samples, 0)
+    for n in range(samples):
+        origin, way, _ = rays(scene, across[..., n], below[..., n])
+        distance, nearest = to_sphere(origin, way, [0, 0, 0], BALL_RADIUS)
+        hit = nearest < BALL_RADIUS
+        through = np.exp(-density * np.where(hit, distance, 0))[..., None]
+        expected += np.where(hit[..., None], RED * through + MIST * (1 - through), 0) / samples
+        coverage += hit / samples
+    # But for rays that pass the ball within the hit distance.
+    sure = framebuffer["A"] == coverage
+    assert (sure & (coverage > 0) & (coverage < 1)).sum() > 80
+    assert sure.mean() > 0.98
+    np.testing.assert_allclose(stacked(framebuffer, ("R", "G", "B"))[sure], expected[sure], atol=0.004)
 
 
 def depth(origin: Floats, way: Floats, distance: Floats, fog: Any, parts: int = 4000) -> Floats:

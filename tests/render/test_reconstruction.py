@@ -287,6 +287,27 @@ def test_transparent(device: Device, samples: int) -> None:
     )
 
 
+@pytest.mark.parametrize("samples", [16, 64])
+def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None:
+    """Seen from infinity the ball is a disc. Independent samples would have a standard error of sqrt(p (1 - p) / N) in a
+    pixel that the disc covers by p; stratified ones halve it at least, and the whole area is better still."""
+    scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (SIDE, SIDE), renderer={"detail": DETAIL}, **FLAT)
+    coverage = shoot(scene, device, samples=samples, channels=("A",))["A"].astype(float)
+    fine, pixel = (passing() < BALL_RADIUS).mean(-1), 2.6 / SIDE
+    # Ray by ray: only those that pass the ball within two hit distances may hit or not.
+    least, most = ((passing(samples) < BALL_RADIUS + reach).mean(-1) for reach in (-1e-5, 0.02 * pixel + 1e-5))
+    assert (coverage >= least).all()
+    assert (coverage <= most).all()
+    _, middle = to_sphere(*rays(scene)[:2], (0, 0, 0), BALL_RADIUS)
+    rim = np.abs(middle - BALL_RADIUS) < 0.75 * pixel  # half a pixel's diagonal, and the hit distance
+    assert rim.sum() > 100
+    independent = np.sqrt((fine * (1 - fine))[rim].mean() / samples)
+    assert np.sqrt(((coverage - fine)[rim] ** 2).mean()) < 0.5 * independent
+    # All of it.
+    disc = [np.pi * (BALL_RADIUS + 2 * detail * pixel) ** 2 for detail in (0, DETAIL)]
+    assert 0.9995 * disc[0] < coverage.sum() * pixel**2 < 1.0005 * disc[1]
+
+
 def test_averages_are_of_linear_light(device: Device) -> None:
     """A pixel half covered has the mean of the numbers in R, G, B, whatever the exposure of a PNG would be."""
     same = {"top": [0.1, 0.2, 3.0], "bottom": [0.1, 0.2, 3.0]}
@@ -377,6 +398,30 @@ def test_profile_of_an_edge(device: Device, name: str, width: float, height: flo
         assert (profile <= most[:, None] + 1.001 / samples).all()
     if (name, width) != ("box", 0.5):  # which leaves gaps between pixels
         assert coverage.sum() * pixel**2 == pytest.approx(4 * (HALF + DETAIL / 2 * pixel) ** 2, rel=1e-3)
+
+
+def test_whole_picture_is_filtered(device: Device) -> None:
+    """A turned square, its corners too: the mean over a tent's area in both directions. Independent samples would have
+    a standard error of sqrt(p (1 - p) / N)."""
+    samples, fine, height, width = 256, 96, 4.0, 2.0
+    scene = from_above("tent", width, height, [0.4, 1, 0], samples)
+    coverage = shoot(scene, device, channels=("A",))["A"].astype(float)
+    grid = np.linspace(-0.5, 0.5, 20001)
+    place = width * np.interp((np.arange(fine) + 0.5) / fine, passed("tent", grid), grid)
+    places = ((np.arange(SIDE) + 0.5 - SIDE / 2)[:, None] + place) * height / SIDE
+    cosine, sine = np.array([1, 0.4]) / np.hypot(1, 0.4)
+    expected = np.zeros((SIDE, SIDE))
+    for column, across in enumerate(places):
+        x, y = across[:, None, None], -places
+        inside = (np.abs(x * cosine + y * sine) < HALF) & (np.abs(y * cosine - x * sine) < HALF)
+        expected[:, column] = inside.mean((0, 2))
+    error = coverage - expected
+    part = (expected > 0.01) & (expected < 0.99)
+    assert part.sum() > 140
+    independent = np.sqrt((expected * (1 - expected))[part].mean() / samples)
+    assert np.sqrt((error[part] ** 2).mean()) < 0.5 * independent
+    assert np.abs(error).max() < 0.04
+    assert abs(error.sum()) < 2 * DETAIL * 4 * 2 * HALF / height * SIDE
 
 
 @pytest.mark.parametrize(("name", "width"), [("box", 1.0), ("tent", 2.0), ("blackman_harris", 3.0)])
