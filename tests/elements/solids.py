@@ -106,7 +106,7 @@ def check_alone(
     assert found.both.sum() > 100
     assert found.deep.max() < error
     # (Of rays that do not graze it.)
-    assert np.quantile(found.off, 0.9) < 10 * error
+    assert found.off[found.facing > 0.2].max() < 10 * error
     # At an edge both faces are right.
     assert (found.turned > 1e-3).sum() <= 3 + 0.01 * found.both.sum()
 

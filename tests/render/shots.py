@@ -216,6 +216,7 @@ class Beside:
         off: how far the picture's places are from these.
         turned: how far its normals, of length 1, are from the oracle's.
         deep: how far its depths are from the oracle's, across a surface with that normal.
+        facing: the cosine between that normal and the ray.
     """
 
     hit: npt.NDArray[np.bool_]
@@ -224,6 +225,7 @@ class Beside:
     off: Floats
     turned: Floats
     deep: Floats
+    facing: Floats
 
 
 def beside(framebuffer: Framebuffer, scene: Scene, t: Floats, normal: Floats, most: int = 3) -> Beside:
@@ -235,12 +237,13 @@ def beside(framebuffer: Framebuffer, scene: Scene, t: Floats, normal: Floats, mo
     both, view = hit & right, view_of(scene)
     points = origin + np.where(both, t, 0)[..., None] * direction
     depth = np.abs((points - view.origin) @ view.axis - framebuffer["Z"])
-    facing = np.abs((normal * direction).sum(-1))
+    facing = np.abs((normal * direction).sum(-1))[both]
     return Beside(
         hit,
         both,
         points,
         np.linalg.norm(points_of(framebuffer) - points, axis=-1)[both],
         np.linalg.norm(normals_of(framebuffer) - normal, axis=-1)[both],
-        (depth[both] * facing[both]),
+        depth[both] * facing,
+        facing,
     )

@@ -67,6 +67,41 @@ def test_every_elementary_interval_holds_one_point() -> None:
                     assert len(set((column * 2 ** (m - i) + row).tolist())) == 2**m
 
 
+def test_pixels_purposes_and_seeds_know_nothing_of_each_other() -> None:
+    """Of the truth that kernels have to the bit."""
+    x, y = grid_of_pixels(64)
+
+    def squares(x: Array, y: Array, seed: int = 0, purpose: int = 0) -> Array:
+        return np.stack(truth(x, y, np.zeros_like(x), seed, purpose)[:2]) / 2.0**32
+
+    here, bound = squares(x, y), 4.5 / math.sqrt(len(x))
+    others = {
+        "right": squares(x + 1, y),
+        "below": squares(x, y + 1),
+        "diagonal": squares(y, x),
+        "purpose": squares(x, y, purpose=1),
+        "light": squares(x, y, purpose=2),
+        "seed": squares(x, y, seed=1),
+        "far seed": squares(x, y, seed=0x9E3779B9),
+    }
+    for name, there in others.items():
+        kept = x != y if name == "diagonal" else np.full(len(x), True)
+        correlation = np.corrcoef(np.concatenate([here[:, kept], there[:, kept]]))[:2, 2:]
+        assert np.abs(correlation).max() < bound, name
+        assert (here[:, kept] == there[:, kept]).mean() < 0.01, name
+    assert abs(np.corrcoef(here)[0, 1]) < bound
+
+
+def test_pixels_have_seeds_of_their_own() -> None:
+    """Of 2^18 random seeds some 8 pairs agree: more than 30 has a chance below 1e-8."""
+    x, y = grid_of_pixels(512)
+    seeds = truth(x, y, np.zeros_like(x), 0, 0)[2]
+    assert len(seeds) - len(np.unique(seeds)) < 30
+    # No row of pixels is another one, shifted.
+    rows = [set(row.tolist()) for row in seeds.reshape(512, 512)]
+    assert max(len(rows[0] & row) for row in rows[1:]) < 4
+
+
 # Filters.
 
 
