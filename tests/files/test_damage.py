@@ -63,7 +63,8 @@ READ: dict[str, tuple[Write, Read]] = {
     "packed.nrrd": (as_volume, read_volume),
     "a.npy": (as_volume, read_volume),
 }
-PICTURES = [name for name in READ if name.startswith("a.") and READ[name][1] is not read_volume]
+# Pictures with a text: how many bytes of heads and texts are damaged, and how many of 1000 damages must be seen at least.
+PICTURES = {"a.exr": (440, 500), "a.png": (200, 500), "a.jpg": (300, 40), "a.webp": (300, 100)}
 WRITTEN: dict[str, Write] = {name: write for name, (write, _) in READ.items() if write is not as_tiles} | {
     f"m{suffix}": lambda path: write_mesh(path, MESH) for suffix in (".ply", ".stl", ".obj", ".glb")
 }
@@ -91,16 +92,15 @@ def test_cut_short_anywhere(name: str, tmp_path: Path) -> None:
     whole = path.read_bytes()
     assert told(path, read) == ""
     assert name not in PICTURES or is_whole(path)
-    for length in {
-        *range(min(500, len(whole))),
-        *range(0, len(whole) - 2, len(whole) // 200),
-        len(whole) - 3,
-    }:
+    lengths = {*range(min(500, len(whole))), *range(0, len(whole), len(whole) // 200)}
+    for length in lengths | {len(whole) - last for last in (1, 2, 3)}:
         rewrite(path, whole[:length])
-        assert told(path, read), length
-        assert name not in PICTURES or not is_whole(path), length
-    for length in (len(whole) - 2, len(whole) - 1):
-        rewrite(path, whole[:length])
+        message = told(path, read)
+        # (A photo may end with bytes that nothing needs.)
+        assert message or (write is as_photo and length > len(whole) - 3), length
+        if name in ("a.exr", "map.exr", "a.png"):
+            # The first bytes tell what it is.
+            assert message.startswith("is cut short: " if length >= 8 else ("is cut short: ", "is not a")), length
         assert name not in PICTURES or not is_whole(path), length
     path.unlink()
     assert told(path, read) == "cannot be read: No such file or directory"
@@ -112,18 +112,18 @@ def test_random_damage_never_breaks_a_reader(name: str, tmp_path: Path) -> None:
     """Of heads and texts; the check sums of a PNG tell of each change of its text."""
     path, (write, read) = tmp_path / name, READ[name]
     write(path)
-    whole = path.read_bytes()
+    whole, (head, least) = path.read_bytes(), PICTURES[name]
     chance, refused = random.Random(2), 0
     for _ in range(1000):
         damaged = bytearray(whole)
         for _ in range(chance.randint(1, 3)):
-            damaged[chance.randrange(min(len(whole), 1200))] = chance.randrange(256)
+            damaged[chance.randrange(head)] = chance.randrange(256)
         rewrite(path, bytes(damaged))
         if told(path, read):
             refused += 1
         elif name == "a.png":
             assert read(path) in (SCENE, None)
-    assert refused > 20
+    assert refused > least
 
 
 @pytest.mark.parametrize("name", WRITTEN)

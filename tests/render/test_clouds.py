@@ -17,22 +17,29 @@ from clfractal.scene.object_grids import placed
 from tests import scenes
 from tests.render.media import (
     CAMERA,
+    CORNER,
     OPACITY,
+    SIDES,
+    SIGMA,
+    VOXEL,
     VOXELS,
     WHITE,
     assert_alike,
     keep_media,
     light_of,
     optical_depth,
+    phase,
     waves,
 )
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import Floats, rays, shoot
+from tests.render.volumes import to_box
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
 
 TURNED: dict[str, Any] = {"rotation": [20, -35, 50], "scale": [1, 1.3, 0.8], "position": [0.2, 0, 0.1]}
+SHINE = {"emission": [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [0.04, 0.02, 0.01]}]}
 BLACK: dict[str, Any] = {"background": {"top": [0, 0, 0], "bottom": [0, 0, 0]}}
 
 
@@ -145,8 +152,7 @@ def test_clouds_are_those_of_the_volume_renderer(device: Device, folder: Path) -
     sampling = {"samples": 256, "filter_width": 0.1, "seed": 3}
     given: dict[str, Any] = {"bounces": 16, "renderer": sampling, "lights": lights}
     given["background"] = {"top": [0.2, 0.3, 0.5], "bottom": [0.4, 0.3, 0.2]}
-    shine = {"emission": [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [0.04, 0.02, 0.01]}]}
-    own = cloud("ball.nrrd", 0.95, 0.4, anisotropy=0.5, transfer=shine)
+    own = cloud("ball.nrrd", 0.95, 0.4, anisotropy=0.5, transfer=SHINE)
     scene = scene_of(folder, {"cloud": own}, **given)
     body = scene.objects["cloud"].model_dump(mode="json")
     renderer = {
@@ -162,10 +168,48 @@ def test_clouds_are_those_of_the_volume_renderer(device: Device, folder: Path) -
     np.testing.assert_allclose(blocks[0], blocks[1], atol=0.03)
 
 
+def test_a_lamp_shines_through_a_cloud_once(device: Device, folder: Path) -> None:
+    """Light scattered once: a place that is asked for brings albedo, phase and what comes through both ways."""
+    lamp = np.array([2.5, -2.5, 3.0])
+    lights = [{"type": "point", "position": lamp.tolist(), "intensity": 20, "falloff": "inverse_square"}]
+    scene = scene_of(folder, {"cloud": cloud("cube.nrrd", 0.8, anisotropy=0.6)}, lights=lights, samples=512)
+    origin, direction, _ = rays(scene)
+    near, far = to_box(origin, direction, CORNER, SIDES)
+    way = np.maximum(far - near, 0)
+    expected = np.zeros(way.shape)
+    for part in (np.arange(300) + 0.5) / 300:
+        points = origin + (near + part * way)[..., None] * direction
+        square = ((lamp - points) ** 2).sum(-1)
+        toward = (lamp - points) / np.sqrt(square)[..., None]
+        out = to_box(points, toward, CORNER, SIDES)[1]
+        scattered = phase((toward * direction).sum(-1), 0.6) * np.pi * 20 / square
+        expected += 0.8 * SIGMA * way / 300 * np.exp(-SIGMA * (part * way + out)) * scattered
+    light = light_of(scene, device)[..., 0]
+    assert light.mean() == pytest.approx(expected.mean(), rel=0.01)
+    blocks = [found.reshape(6, 4, 6, 4).mean(axis=(1, 3)) for found in (light, expected)]
+    np.testing.assert_allclose(blocks[0], blocks[1], atol=0.1 * expected.max())
+
+
+def test_a_cloud_shines_through_another(device: Device, folder: Path) -> None:
+    """j (1 - exp(-sigma L)) / sigma of a black cloud, dimmed where another one stands wholly before it."""
+    front = cloud("cube.nrrd", position=[0.8, -2.1, 0.65], opacity=0.06)
+    objects = {"cloud": cloud("cube.nrrd", transfer=SHINE), "front": front}
+    scene = scene_of(folder, objects, samples=512)
+    origin, direction, _ = rays(scene)
+    near, far = to_box(origin, direction, CORNER, SIDES)
+    depth = depth_of(scene, "front", np.ones((VOXELS,) * 3, np.float32), origin, direction, opacity=0.06)
+    expected = (1 - np.exp(-SIGMA * np.maximum(far - near, 0))) / SIGMA / VOXEL * np.exp(-depth)
+    before = to_box(origin, direction, CORNER + [0.8, -2.1, 0.65], SIDES)[1] < near
+    light = light_of(scene, device)
+    for part in (before & (depth > 0) & (far > near), (depth == 0) & (far > near)):
+        assert part.sum() > 60
+        seen = light[part].mean(axis=0)
+        np.testing.assert_allclose(seen, np.array([0.04, 0.02, 0.01]) * expected[part].mean(), rtol=0.03)
+
+
 def test_layers_have_the_light_of_clouds(device: Device, folder: Path) -> None:
     """Before nothing too, where coverage says that nothing is seen."""
-    shine = {"emission": [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [0.04, 0.02, 0.01]}]}
-    objects = {"cloud": cloud("cube.nrrd", 0.5, 0.05, transfer=shine)}
+    objects = {"cloud": cloud("cube.nrrd", 0.5, 0.05, transfer=SHINE)}
     scene = scene_of(
         folder, objects, samples=4, background="transparent", lighting={"mode": "path", "bounces": 2}
     )

@@ -37,9 +37,9 @@ materials: {m: {base: {weight: {by: normal, curve: [[0.5, 0], [0.2, 1]]}}}}
 materials: {m: {base: {weight: {by: hight}}}} => did you mean 'height'?
 materials: {m: {base: {weight: thick}}} => materials.m.base.weight: must be a number, got 'thick'
 materials: {m: {base: {color: {texture: none.png}}}}
-=> none.png cannot be read: No such file
+=> materials.m.base.color.texture: none.png cannot be read: No such file
 materials: {m: {base: {color: {texture: text.png}}}}
-=> text.png is no picture, or a damaged one
+=> materials.m.base.color.texture: text.png is no picture, or a damaged one
 materials: {m: {base: {color: {texture: ../x.png}}}}
 => materials.m.base.color.texture: must be a path inside the scene's folder, got '../x.png'
 # Reliefs.
@@ -51,7 +51,7 @@ materials: {m: {bump: {height: §{}}}} => materials.m.bump.height: needs one of 
 materials: {m: {bump: {height: {by: trap, curve: [[0, 0], [1, §-2e6]]}}}}
 => materials.m.bump.height.curve.1.1: must be at least -1e+06, got -2e+06
 materials: {m: {bump: {height: {texture: §none.png}}}}
-=> none.png cannot be read: No such file or directory
+=> materials.m.bump.height.texture: none.png cannot be read: No such file or directory
 materials: {m: {bump: {height: {by: trap}}}}
 objects: {b: {material: m}}
 => objects.b.material: 'm' differs from place to place, which needs lighting.mode: path
@@ -77,6 +77,8 @@ materials: {m: {transmission: {scatter: [0.5, 0.5, 0.5]}}}
 => materials.m.transmission.scatter: needs a depth above 0: scattering is told for the way through it
 materials: {m: {transmission: {scater: [1, 1, 1]}}}
 => materials.m.transmission: unknown key 'scater'; did you mean 'scatter'?
+materials: {m: {transmission: {wait: 1}}}
+=> materials.m.transmission: unknown key 'wait'; did you mean 'weight'?
 materials: {m: {transmission: {depth: 1, scatter: [2, 1, 1]}}}
 => materials.m.transmission.scatter.0: must be at most 1, got 2
 materials: {m: {transmission: {depth: 1, scatter_anisotropy: 1}}}
@@ -153,9 +155,12 @@ output: {precision: {CryptoObject00.R: half}} => must be float: numbers of thing
 
 
 @pytest.mark.parametrize(("lines", "message"), CASES)
-def test_wrong_pictures(lines: str, message: str, tmp_path: Path) -> None:
-    (tmp_path / "text.png").write_text("no picture")
+def test_wrong_pictures(
+    lines: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("text.png").write_text("no picture")
     text, place = marked(HEAD + lines)
-    found = error_of(text, folder=tmp_path)
+    found = error_of(text)
     assert message in found
-    assert "§" not in lines or found.startswith(f"{place}: ")
+    assert found.startswith(f"{place}: " if "§" in lines else "scene:")
