@@ -213,6 +213,18 @@ def lake(height: float) -> Scene:
     return scene(objects, {"white": MATT, "lake": glass(0, 1.33)}, camera=camera, bounces=64)
 
 
+def glossy_objects() -> Scene:
+    """A floor, and what stands and hovers over it."""
+    parts: dict[str, dict[str, Any]] = {
+        "floor": {"type": "plane", "position": [0, 0, -0.5]},
+        "ball": {"type": "sphere", "position": [0.2, -0.1, 0.3], "radius": 0.4},
+        "box": {"type": "box", "size": [0.4, 0.4, 1], "position": [-0.8, 0.4, 0], "rotation": [0, 0, 30]},
+    }
+    objects = {name: {**each, "material": "gloss"} for name, each in parts.items()}
+    camera = {"position": [1, 42.2, 2], "target": [0.1, 44, 0], "fov": 48}
+    return scene(objects, {"gloss": MATERIALS["gloss"]}, camera=camera, bounces=32)
+
+
 def holes(roughness: float) -> Scene:
     """Glass of which something is cut out, and into which something flows."""
     return scene_of(
@@ -257,6 +269,7 @@ PICTURES: dict[str, tuple[Callable[[], Scene], int, float]] = {
     "sphere of skin": (lambda: body_of(SOFT, "sphere", 16), 32, 0.01),
     "lake from above": (lambda: lake(2), 16, 0.01),
     "lake from below": (lambda: lake(-0.8), 16, 0.01),
+    "glossy objects": (glossy_objects, 32, 0.01),
     "holes in glass": (lambda: holes(0), 32, 0.01),
 }
 MORE_PICTURES: dict[str, tuple[Callable[[], Scene], int, float]] = {
@@ -295,7 +308,9 @@ def test_sets(name: str) -> None:
     build, samples, error = {**SETS, **MORE_SETS}[name]
     colors = seen(build(), samples)[0]
     assert len(colors) > 100
-    assert abs(colors.mean() - 1) < error
+    # (Under layers all colours together are looked at: see `layered_skin`.)
+    means = colors.mean(axis=None if "under layers" in name else 0)
+    assert np.abs(means - 1).max() < error
 
 
 @pytest.mark.parametrize("name", [*PICTURES, *combinations(MORE_PICTURES)])
@@ -303,6 +318,8 @@ def test_pictures(name: str) -> None:
     build, samples, error = {**PICTURES, **MORE_PICTURES}[name]
     colors: Floats = colors_of(build(), samples)
     assert np.abs(colors.mean(axis=(0, 1)) - 1).max() < error
+    # Light that edges of holes lose is lost in few pixels.
+    assert "holes" not in name or np.percentile(colors, 2) > 0.8
 
 
 @pytest.mark.parametrize(
