@@ -15,7 +15,7 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests import scenes
-from tests.render.cut_oracle import BODIES, WHITE, Met, face_tint, first_met, scene_of
+from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
 from tests.variants import one_of
@@ -39,11 +39,12 @@ def met_by_eye(scene: Scene) -> tuple[Met, Floats, Floats]:
 
 
 @pytest.mark.parametrize("mode", MODES)
-def test_each_plane_cuts_what_it_names(device: Device, mode: str) -> None:
+@pytest.mark.parametrize("lanes", one_of(None, 1))
+def test_each_plane_cuts_what_it_names(device: Device, mode: str, lanes: int | None) -> None:
     """The set has the first plane's face only, though the other passes it; the crate has the other's; the egg, in front of
     both, is whole. Places, normals, counts, colours and things, pixel by pixel."""
     scene = scene_of(**MODES[mode])
-    framebuffer = framebuffer_of(scene, device)
+    framebuffer = framebuffer_of(scene, device, lanes=lanes)
     found, at, _ = met_by_eye(scene)
     sure = found.sure & (found.body >= 0)
     assert (~found.sure).mean() < 0.15
@@ -122,6 +123,20 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
         direction,
         lambda tint, normal: 0.7 * tint * np.maximum(normal @ toward, 0)[..., None],
     )
+
+
+def test_faces_throw_no_shadow_on_themselves(device: Device) -> None:
+    """Where a light of intensity 1 shines along the first plane's normal its face has its colours, but in the
+    egg's shadow."""
+    toward = np.array(PLANES[0]["plane"]["normal"])
+    scene = scene_of(**MODES["path"], lights=[{"direction": list(-toward), "shadow": True}])
+    light = stacked(framebuffer_of(scene, device), "RGB")
+    found, at, _ = met_by_eye(scene)
+    tint, certain = face_tint(scene, found, at)
+    face = found.sure & certain & (found.plane == 0)
+    lit = face & (light.max(-1) > 0)
+    assert lit.sum() > 0.8 * face.sum()
+    np.testing.assert_allclose(light[lit], tint[lit], atol=2e-4)
 
 
 def test_shadows_end_where_cuts_begin(device: Device) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from functools import lru_cache
 from typing import Any
 
@@ -47,8 +48,10 @@ def off(scene: Scene, places: Floats, normals: Floats, nearly: float = 1.002) ->
     return degrees(normals[on_it], slopes(scene.chain, places[on_it], limit))
 
 
-@pytest.mark.parametrize("iterations", [3, 5, 8])
-@pytest.mark.parametrize("name", UNEVEN)
+@pytest.mark.parametrize(
+    ("name", "iterations"),
+    [*itertools.product(UNEVEN, [3, 5, 8]), ("mandelbulb", 3), ("quaternion_julia", 8)],
+)
 def test_normals_are_the_slope_of_the_last_z(device: Device, name: str, iterations: int) -> None:
     """Of all hits where they lie, but of a surface that no pixel shows as it is: after eight applications a pixel of the
     whole Riemann sphere holds many sheets, and the normal at a place between them is of none."""

@@ -252,6 +252,20 @@ def test_a_column_that_is_upright_but_for_rounding() -> None:
                 assert (found.residual <= 8 * epsilon(precision) * size).all()
 
 
+def test_perspective_silhouette() -> None:
+    """Rays that miss the near ball and find a wall behind it, however far: every triangle tells a normal."""
+    random = np.random.default_rng(19)
+    behind = 10.0 ** random.uniform(0, 4, (200, 1))
+    depths = np.where(random.random((200, 9)) < 0.5, 1.0, behind) + random.uniform(0, 1e-3, (200, 9))
+    ways = oracle.unit(np.concatenate([GRID * 1e-3, -np.ones((9, 1))], axis=1))
+    points = ways * depths[..., None] + [0, 0, 1]  # relative to the ball
+    for precision, lanes in variants():
+        found = run(points, all_found(points), precision, lanes)
+        assert_all_safe(found, 4 * epsilon(precision))
+        assert found.mean_usable.all()
+        assert found.eight_usable.all()
+
+
 # What a search may hand over, far beyond what it should.
 NUMBERS = st.floats(-1e12, 1e12) | st.sampled_from([0.0, 1.0, -1.0, 1e-7, 1e-20, 1e-38, 1e12])
 
