@@ -240,7 +240,15 @@ CALLS: list[tuple[Callable[[], object], str]] = [
         lambda: clfractal.variations(SOURCE, strength=WRONG),
         "strength: must be slight, medium or heavy, got 5",
     ),
-    (lambda: clfractal.variations(SOURCE, kinds=["colour"]), "kinds: unknown kind 'colour'"),  # type: ignore[list-item]
+    (
+        lambda: clfractal.variations(SOURCE, strength="hevy"),  # type: ignore[arg-type]
+        "strength: must be slight, medium or heavy, got 'hevy'; did you mean 'heavy'?",
+    ),
+    (
+        lambda: clfractal.variations(SOURCE, kinds=["colours"]),  # type: ignore[list-item]
+        "kinds: unknown kind 'colours'; did you mean 'colors'?",
+    ),
+    (lambda: clfractal.variations(SOURCE, count=0), "count: must be from 1 to 100000, got 0"),
     (lambda: clfractal.variations(SOURCE, locked="camera"), "locked: must be a list of texts"),
     (lambda: clfractal.voxelize(WRONG), "scene: must be a path"),
     (lambda: clfractal.voxelize(SOURCE, resolution=WRONG / 2), "resolution: must be"),

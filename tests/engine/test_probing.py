@@ -86,7 +86,9 @@ def test_films_tell_the_same(engine: clfractal.Engine) -> None:
     part = engine.render(scene, region=(30, 10, 20, 20))
     assert "N.X" not in part
     assert part.probe(40, 21) == expected
-    assert pickle.loads(pickle.dumps(part)).probe(40, 21) == expected
+    sent = pickle.loads(pickle.dumps(part))
+    assert sent.probe(40, 21) == expected
+    assert sent.stats == part.stats != {}
     assert str(failure(clfractal.SceneError, part.probe, 50, 21)) == "x: must be from 30 to 49, got 50"
     with pytest.raises(clfractal.SceneError, match=r"^y: must be a whole number, got 2\.5$"):
         part.probe(40, 2.5)  # type: ignore[arg-type]
