@@ -63,7 +63,7 @@ READ: dict[str, tuple[Write, Read]] = {
     "packed.nrrd": (as_volume, read_volume),
     "a.npy": (as_volume, read_volume),
 }
-# Pictures with a text: how many bytes of heads and texts are damaged, and how many of 1000 damages must be seen at least.
+# Pictures with a text: how many bytes of heads and texts are damaged, and how many of 1000 damages are seen.
 PICTURES = {"a.exr": (440, 500), "a.png": (200, 500), "a.jpg": (300, 40), "a.webp": (300, 100)}
 WRITTEN: dict[str, Write] = {name: write for name, (write, _) in READ.items() if write is not as_tiles} | {
     f"m{suffix}": lambda path: write_mesh(path, MESH) for suffix in (".ply", ".stl", ".obj", ".glb")
@@ -100,7 +100,8 @@ def test_cut_short_anywhere(name: str, tmp_path: Path) -> None:
         assert message or (write is as_photo and length > len(whole) - 3), length
         if name in ("a.exr", "map.exr", "a.png"):
             # The first bytes tell what it is.
-            assert message.startswith("is cut short: " if length >= 8 else ("is cut short: ", "is not a")), length
+            said = "is cut short: " if length >= 8 else ("is cut short: ", "is not a")
+            assert message.startswith(said), length
         assert name not in PICTURES or not is_whole(path), length
     path.unlink()
     assert told(path, read) == "cannot be read: No such file or directory"

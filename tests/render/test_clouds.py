@@ -169,7 +169,7 @@ def test_clouds_are_those_of_the_volume_renderer(device: Device, folder: Path) -
 
 
 def test_a_lamp_shines_through_a_cloud_once(device: Device, folder: Path) -> None:
-    """Light scattered once: a place that is asked for brings albedo, phase and what comes through both ways."""
+    """Scattered once: a place that is asked for brings albedo, phase and what comes through both ways."""
     lamp = np.array([2.5, -2.5, 3.0])
     lights = [{"type": "point", "position": lamp.tolist(), "intensity": 20, "falloff": "inverse_square"}]
     scene = scene_of(folder, {"cloud": cloud("cube.nrrd", 0.8, anisotropy=0.6)}, lights=lights, samples=512)
@@ -192,14 +192,15 @@ def test_a_lamp_shines_through_a_cloud_once(device: Device, folder: Path) -> Non
 
 def test_a_cloud_shines_through_another(device: Device, folder: Path) -> None:
     """j (1 - exp(-sigma L)) / sigma of a black cloud, dimmed where another one stands wholly before it."""
-    front = cloud("cube.nrrd", position=[2.2, -2.1, 0.65], opacity=0.06)
+    aside = np.array([2.2, -2.1, 0.65])
+    front = cloud("cube.nrrd", position=aside.tolist(), opacity=0.06)
     objects = {"cloud": cloud("cube.nrrd", transfer=SHINE), "front": front}
     scene = scene_of(folder, objects, samples=512)
     origin, direction, _ = rays(scene)
     near, far = to_box(origin, direction, CORNER, SIDES)
     depth = depth_of(scene, "front", np.ones((VOXELS,) * 3, np.float32), origin, direction, opacity=0.06)
     expected = (1 - np.exp(-SIGMA * np.maximum(far - near, 0))) / SIGMA / VOXEL * np.exp(-depth)
-    before = to_box(origin, direction, CORNER + [2.2, -2.1, 0.65], SIDES)[1] < near
+    before = to_box(origin, direction, CORNER + aside, SIDES)[1] < near
     light = light_of(scene, device)
     for part in (before & (depth > 0) & (far > near), (depth == 0) & (far > near)):
         assert part.sum() > 60

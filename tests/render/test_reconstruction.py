@@ -289,13 +289,15 @@ def test_transparent(device: Device, samples: int) -> None:
 
 @pytest.mark.parametrize("samples", [16, 64])
 def test_coverage_is_the_share_of_the_area(device: Device, samples: int) -> None:
-    """Seen from infinity the ball is a disc. Independent samples would have a standard error of sqrt(p (1 - p) / N) in a
-    pixel that the disc covers by p; stratified ones halve it at least, and the whole area is better still."""
+    """Seen from infinity the ball is a disc. Independent samples would have a standard error of
+    sqrt(p (1 - p) / N) in a pixel that the disc covers by p; stratified ones halve it at least, and the whole
+    area is better still."""
     scene = scene_of(QUICK_BALL, ORTHOGRAPHIC, (SIDE, SIDE), renderer={"detail": DETAIL}, **FLAT)
     coverage = shoot(scene, device, samples=samples, channels=("A",))["A"].astype(float)
     fine, pixel = (passing() < BALL_RADIUS).mean(-1), 2.6 / SIDE
     # Ray by ray: only those that pass the ball within two hit distances may hit or not.
-    least, most = ((passing(samples) < BALL_RADIUS + reach).mean(-1) for reach in (-1e-5, 0.02 * pixel + 1e-5))
+    reaches = (-1e-5, 0.02 * pixel + 1e-5)
+    least, most = ((passing(samples) < BALL_RADIUS + reach).mean(-1) for reach in reaches)
     assert (coverage >= least).all()
     assert (coverage <= most).all()
     _, middle = to_sphere(*rays(scene)[:2], (0, 0, 0), BALL_RADIUS)
@@ -401,8 +403,8 @@ def test_profile_of_an_edge(device: Device, name: str, width: float, height: flo
 
 
 def test_whole_picture_is_filtered(device: Device) -> None:
-    """A turned square, its corners too: the mean over a tent's area in both directions. Independent samples would have
-    a standard error of sqrt(p (1 - p) / N)."""
+    """A turned square, its corners too: the mean over a tent's area in both directions. Independent samples
+    would have a standard error of sqrt(p (1 - p) / N)."""
     samples, fine, height, width = 256, 96, 4.0, 2.0
     scene = from_above("tent", width, height, [0.4, 1, 0], samples)
     coverage = shoot(scene, device, channels=("A",))["A"].astype(float)

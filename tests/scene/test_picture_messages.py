@@ -155,9 +155,7 @@ output: {precision: {CryptoObject00.R: half}} => must be float: numbers of thing
 
 
 @pytest.mark.parametrize(("lines", "message"), CASES)
-def test_wrong_pictures(
-    lines: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_wrong_pictures(lines: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("text.png").write_text("no picture")
     text, place = marked(HEAD + lines)
