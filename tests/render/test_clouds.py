@@ -152,7 +152,8 @@ def test_clouds_are_those_of_the_volume_renderer(device: Device, folder: Path) -
     sampling = {"samples": 256, "filter_width": 0.1, "seed": 3}
     given: dict[str, Any] = {"bounces": 16, "renderer": sampling, "lights": lights}
     given["background"] = {"top": [0.2, 0.3, 0.5], "bottom": [0.4, 0.3, 0.2]}
-    own = cloud("ball.nrrd", 0.95, 0.4, anisotropy=0.5, transfer=SHINE)
+    shine = {"emission": [{"at": 0, "emission": [0, 0, 0]}, {"at": 1, "emission": [0.04, 0.02, 0.01]}]}
+    own = cloud("ball.nrrd", 0.95, 0.4, anisotropy=0.5, transfer=shine)
     scene = scene_of(folder, {"cloud": own}, **given)
     body = scene.objects["cloud"].model_dump(mode="json")
     renderer = {
