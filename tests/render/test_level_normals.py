@@ -54,7 +54,7 @@ def off(scene: Scene, places: Floats, normals: Floats, nearly: float = 1.002) ->
 )
 def test_normals_are_the_slope_of_the_last_z(device: Device, name: str, iterations: int) -> None:
     """Of all hits where they lie, but of a surface that no pixel shows as it is: after eight applications a pixel of the
-    whole Riemann sphere holds many sheets, and the normal at a place between them is of none."""
+    whole Riemann sphere holds many sheets, and the normal at a place between them is of none: see the next test."""
     scene = scene_of({"name": name, "iterations": iterations}, CAMERA, (144, 108), renderer=FINE)
     places, normals = hits(shoot(scene, device, finest(device), lanes=4))
     assert np.median(off(scene, places, normals)) < 0.1
@@ -65,6 +65,24 @@ def test_normals_are_the_slope_of_the_last_z(device: Device, name: str, iteratio
     assert np.nanmedian(angles) < 0.1
     if iterations == 3:
         assert np.percentile(angles, 90) < 0.1
+
+
+def test_what_is_dust_from_afar_has_these_normals_from_near(device: Device) -> None:
+    """In pixels that are hundreds of times smaller most of those sheets are smooth."""
+    formula = {"name": "riemann_sphere", "iterations": 8}
+    whole = scene_of(formula, CAMERA, (144, 108), renderer=FINE)
+    targets, _ = hits(shoot(whole, device, finest(device), lanes=4))
+    found = []
+    for target in targets[len(targets) // 20 :: len(targets) // 10]:
+        camera = {"position": list(whole.camera.position), "target": target.tolist(), "fov": 45 / 400}
+        near = scene_of(formula, camera, (24, 24), renderer=FINE)
+        places, normals = hits(shoot(near, device, finest(device), lanes=4))
+        found.append(degrees(normals, slopes(whole.chain, places, 8)))
+    angles = np.concatenate(found)
+    assert len(angles) > 3000
+    assert np.isfinite(angles).mean() > 0.99
+    assert np.nanmedian(angles) < 0.1
+    assert (angles < 0.1).mean() > 0.65
 
 
 @pytest.mark.parametrize("search", SEARCHES)
