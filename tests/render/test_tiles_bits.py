@@ -13,6 +13,7 @@ import pytest
 from clfractal.device.launch import Pace
 from clfractal.device.select import Device
 from clfractal.device.structs import Precision
+from clfractal.device.tune import accepted_lanes
 from clfractal.engine import drawing
 from clfractal.engine import local_executor as local
 from clfractal.engine.local_executor import LocalExecutor
@@ -23,10 +24,12 @@ from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.passes import kept_numbers
 from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.scene.model import Scene
-from tests.render.bits import same
+from tests.render.bits import close, same
 from tests.render.passes import RENDERERS, scene_with
 from tests.render.passes import SIZE as PASS_SIZE
+from tests.render.planes import plane_scene
 from tests.render.shots import (
+    BALL,
     CHANNELS,
     job_of,
     plan_of,
@@ -36,6 +39,9 @@ from tests.render.shots import (
     stacked,
 )
 from tests.scenes import scene_of
+from tests.variants import combinations, one_of
+
+Variant = tuple[Precision, int | None]
 
 SIZE = (100, 75)  # no multiple of a tile's side, in neither direction
 LIGHTS: list[dict[str, Any]] = [
@@ -43,6 +49,16 @@ LIGHTS: list[dict[str, Any]] = [
     {"type": "point", "position": [2, -2, 1], "color": [0.3, 0.4, 0.6], "falloff": "inverse_square"},
 ]
 CAMERA = {"position": [1.3, -2.6, 1.6], "target": [0, 0, 0], "fov": 45}
+SHADOWS = [{"direction": [-1, 1, -1], "shadow": True}, {"type": "point", "position": [2, -2, 3]}]
+HAST = {"name": "hast", "iterations": 12}
+BOX = {"center": [-0.2, 0, 0], "size": [2.4, 2.6, 2.8]}
+VOLUME = {"type": "volume", "box": BOX, "resolution": [45, 52, 48], "shadows": True}
+FOG = {"opacity": [{"at": 0.1, "opacity": 0}, {"at": 1, "opacity": 0.4}]}
+PLANES = [
+    {"plane": {"center": [0, -0.2, 0], "normal": [0.2, -1, 0.3]}, "opacity": 0.5},
+    {"plane": {"center": [0.2, 0, 0], "normal": [1, -0.3, 0.2]}, "cut": True, "opacity": 0.3},
+]
+UNSEEN = {"plane": {"center": [0, 0, 9]}, "opacity": 0}
 SCENES: dict[str, Scene] = {
     # Coloured as the scenes of the library that show it, whose programs have the same text.
     "mandelbulb": scene_of(
@@ -67,6 +83,17 @@ SCENES: dict[str, Scene] = {
         material={"name": "milk"},
         objects={"ball": {"type": "sphere", "position": [0.8, -3, 0.6], "radius": 0.4, "material": "milk"}},
     ),
+    # Of programs and grids that other tests need, too.
+    "volume": scene_of(HAST, CAMERA, SIZE, lights=SHADOWS, renderer=VOLUME, cut_planes=PLANES[1:]),
+    "fog": scene_of(
+        HAST,
+        CAMERA,
+        SIZE,
+        lights=SHADOWS,
+        renderer={**VOLUME, "transfer": FOG, "samples": 3},
+        background="transparent",
+    ),
+    "cut object": scene_of(BALL, CAMERA, SIZE, lights=SHADOWS, cut_planes=[*PLANES, UNSEEN, UNSEEN]),
     # Rays end while a hit is being proved: what they would find later must not count if others of their packet go on.
     "hast, few steps": scene_of(
         {"name": "hast", "iterations": 20},
@@ -178,6 +205,48 @@ def test_groups_of_tiles_in_parts(
     assert same(stacked(framebuffer), wholes[name])
 
 
+# Of few iterations: folds of hast are finer than float32 soon.
+FEW = {
+    name: scene_of({"name": name, "iterations": 4}, CAMERA, SIZE, lights=LIGHTS)
+    for name in ("hast", "mandelbulb")
+}
+# In float64, because at the set's border a rounding of float32 is another count.
+WHOLE = {"center": [-0.5, 0, 0], "width": 3, "height": 3}
+COUNTS = plane_scene(size=(40, 40), plane=WHOLE, colors={"mode": "stepped"})
+SINGLE: Variant = ("float32", None)
+DOUBLE: Variant = ("float64", None)
+
+
+@pytest.mark.parametrize(
+    ("scene", "usual", "others", "off"),
+    [
+        (SCENES["volume"], SINGLE, [("float32", 1), DOUBLE], 0.005),
+        (SCENES["fog"], SINGLE, [("float32", lanes) for lanes in (4, 8, 16)], 0.005),
+        (FEW["hast"], SINGLE, [DOUBLE], 0.005),
+        (COUNTS, DOUBLE, [("float64", 1)], 0.001),
+        *combinations(
+            [
+                (SCENES["volume"], SINGLE, [("float32", lanes) for lanes in (4, 8, 16)], 0.005),
+                (SCENES["fog"], SINGLE, [("float32", 1)], 0.005),
+                (SCENES["mandelbulb"], SINGLE, [("float32", lanes) for lanes in (1, 4, 8, 16)], 0.005),
+                (FEW["mandelbulb"], SINGLE, [DOUBLE], 0.005),
+            ]
+        ),
+    ],
+)
+def test_lanes_and_number_types_are_close(
+    device: Device, scene: Scene, usual: Variant, others: list[Variant], off: float
+) -> None:
+    """Packets of another width are another program: the last bits differ, and with them what decides at a rim."""
+    whole, *found = (
+        stacked(shoot(scene, device, precision, lanes=lanes))
+        for precision, lanes in (usual, *others)
+        if (lanes or 1) in accepted_lanes(device, precision)
+    )
+    for each in found:
+        close(each, whole, off)
+
+
 def test_statistics_do_not_depend_on_batches(device: Device) -> None:
     """Rays, steps and applications are counted once each, in parts of tiles too."""
     scene = SCENES["hast"]
@@ -253,6 +322,32 @@ def test_passes_have_the_bits_of_one(
         np.testing.assert_array_equal(
             stacked(last, channels).view(np.uint32), whole.view(np.uint32), str(split)
         )
+
+
+@pytest.mark.parametrize("budget", one_of(1e-7, 1e-3))
+@pytest.mark.parametrize("kind", RENDERERS)
+def test_adaptive_tiles_in_parts_have_the_same_bits(
+    kind: str, budget: float, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """So little time that a launch is one sample of one packet: packets and samples are split, and counted once."""
+    scene = scene_with(kind, **NOISY)
+    plan = plan_of(scene, device)
+    spans: list[Span] = []
+    start = drawing.Drawing.start
+
+    def noted(self: drawing.Drawing, span: Span) -> object:
+        spans.append(span)
+        return start(self, span)
+
+    monkeypatch.setattr(drawing.Drawing, "start", noted)
+    framebuffer = Framebuffer(plan.channels, PASS_SIZE, plan.region)
+    state = render_planned(scene, plan, device, framebuffer, budget_seconds=budget)
+    whole = shoot(scene, device)
+    assert same(stacked(framebuffer), stacked(whole))
+    assert state.rays == whole["samples"].sum()
+    if budget < 1e-5:
+        assert any(span.samples[1] - span.samples[0] < 16 for span in spans)
+        assert any(span.packets[1] - span.packets[0] < TILE * TILE // plan.lanes for span in spans)
 
 
 def test_a_pass_is_the_picture_of_its_samples(device: Device) -> None:
