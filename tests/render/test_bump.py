@@ -19,9 +19,10 @@ from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from tests.devices import check_usable
 from tests.environment_maps import write_map
+from tests.render.bits import alike_by_lanes
 from tests.render.levels import orbit
 from tests.render.normals_oracle import unit
-from tests.render.path_scenes import seen
+from tests.render.path_scenes import path, seen
 from tests.render.reliefs import BULB, EYE, Floats, displaced, facts, relief
 from tests.render.shots import degrees
 from tests.variants import one_of
@@ -258,6 +259,12 @@ def test_a_flat_relief_changes_nothing() -> None:
     plain = seen(relief(0), 4)[0]
     assert np.array_equal(plain, seen(relief(0.5), 4)[0])
     assert np.array_equal(plain, seen(relief({"by": "normal", "curve": [[0, 2], [1, 2]]}), 4)[0] * 1.0)
+
+
+@pytest.mark.combination
+def test_every_lane_is_alone() -> None:
+    found = relief({"by": "normal", "curve": [[0, 0], [1, 0.2]]}, width=0.05, lighting=path(1), **BULB)
+    alike_by_lanes(found, choose(), ("R", "normal.X"), share=0.9, apart=1e-3)
 
 
 def test_normals_face_the_viewer() -> None:

@@ -10,6 +10,7 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from clfractal.shading.emitters import sampled_radiance
+from tests.render.bits import alike_by_lanes
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import Floats, points_of, shoot, stacked
 from tests.scenes import scene_of
@@ -203,6 +204,11 @@ def test_the_eye_and_mirrors_see_the_whole_of_it(device: Device) -> None:
     np.testing.assert_array_equal(
         colors(lit({"it": ball}, 2, 1, at_it), device)[12, 12], np.float32(6 * COLOR)
     )
+
+
+@pytest.mark.combination
+def test_every_lane_is_alone(device: Device) -> None:
+    alike_by_lanes(among_many(GLOW, 4), device, share=0.99, mean=0.02, rtol=0, atol=1e-3)
 
 
 def test_what_is_asked_for() -> None:

@@ -20,6 +20,7 @@ from clfractal.scene.model import Scene
 from clfractal.shading.maps import level_sizes, levels_of
 from tests.devices import check_usable
 from tests.render import reliefs
+from tests.render.bits import alike_by_lanes
 from tests.render.path_scenes import GREY, path, scene_of, seen
 from tests.render.reliefs import BULB, Floats, ramp
 from tests.variants import one_of
@@ -112,6 +113,15 @@ def test_the_formula_is_asked() -> None:
         scene = shining({"luminance": {"by": by, "range": [0, 4]}, "color": [4, 4, 4]})
         colors, _ = shown(scene)
         assert np.abs(colors - expected).max() < tolerance, by
+
+
+@pytest.mark.combination
+def test_every_lane_is_alone() -> None:
+    emission = {
+        "luminance": {"by": "trap", "trap": {"shape": "plane"}, "range": [0, 0.5]},
+        "color": {"by": "normal", "palette": RAMP},
+    }
+    alike_by_lanes(shining(emission, **BULB), choose(), share=0.99, apart=2e-4)
 
 
 @pytest.mark.combination

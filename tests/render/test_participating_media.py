@@ -9,8 +9,10 @@ import numpy.typing as npt
 import pytest
 
 import clfractal
+from clfractal.device.select import choose
 from clfractal.scene.model import Scene
-from tests.render.glass_scenes import BODIES, colors_of, glass, scene
+from tests.render.bits import alike_by_lanes
+from tests.render.glass_scenes import BODIES, ball, colors_of, glass, scene
 from tests.render.path_scenes import BLACK, GREY, path, scene_of, seen
 from tests.variants import one_of
 
@@ -212,3 +214,24 @@ def test_a_ball_is_that_of_a_random_walk() -> None:
     of_object = colors_of(scene(objects, {"m": material}, bounces=8), 256)[13:19, 13:19].mean(axis=(0, 1))
     np.testing.assert_allclose(of_set, expected, atol=0.006)
     np.testing.assert_allclose(of_object, expected, atol=0.01)
+
+
+@pytest.mark.combination
+@pytest.mark.parametrize(
+    ("found", "share"),
+    [
+        (
+            scene(
+                {"body": {**BODIES["box"], "material": "m"}}, {"m": milk(color=[0.8, 0.9, 0.7])}, bounces=16
+            ),
+            0.8,
+        ),
+        (ball(0.1, bounces=16), 0.8),
+        (set_of(skin(radius=0.1), background={"top": [1, 0.6, 0.2], "bottom": [0.1, 0.2, 0.5]}), 0),
+    ],
+    ids=["milk", "glass", "skin"],
+)
+def test_every_lane_is_alone(found: Scene, share: float) -> None:
+    """Paths are noise that small differences stir, those in skin the most."""
+    samples = found.surface.model_copy(update={"samples": 8})
+    alike_by_lanes(found.model_copy(update={"renderer": samples}), choose(), share=share)

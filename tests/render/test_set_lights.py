@@ -15,6 +15,7 @@ from clfractal.scene.model import Scene
 from clfractal.schema.trap import Trap
 from clfractal.shading.kind_numbers import TRAPS
 from clfractal.shading.set_lights import BALL_NUMBERS, SetLights, packed, probabilities, set_lights_of
+from tests.render.bits import alike_by_lanes
 from tests.render.shots import PERSPECTIVE, QUICK_BALL, Floats, rays, shoot, stacked
 from tests.render.traps import TRAP, TRAP_FORMULAS, trap_by_numpy, trap_scene
 from tests.scenes import scene_of
@@ -201,6 +202,13 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
     assert (seen == wanted)[clear].mean() > 0.99
     hidden = lit({"count": 1500, "radius": 0.02, "height": 0.4, "visible": False}, 1, material=BLACK)
     assert not (shoot(hidden, device)["R"] > 0.5).any()
+
+
+@pytest.mark.combination
+@pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
+def test_every_lane_is_alone(device: Device, mode: dict[str, Any]) -> None:
+    """A rounding may choose another ball now and then."""
+    alike_by_lanes(lit({"count": 300, "radius": 0.01}, 8, **mode), device, lanes=(8,), share=0.98)
 
 
 def test_colours_follow_the_trap() -> None:

@@ -11,6 +11,7 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
+from tests.render.bits import alike_by_lanes
 from tests.render.media import phase
 from tests.render.shots import (
     BALL_RADIUS,
@@ -233,6 +234,11 @@ def test_glow_is_the_integral(device: Device, case: str) -> None:
     assert wanted[inner].max() > 0.1
     assert abs(seen[inner].mean() / wanted[inner].mean() - 1) < 0.01
     np.testing.assert_allclose(seen[inner], wanted[inner], rtol=0.06, atol=0.02 * wanted[inner].max())
+
+
+@pytest.mark.combination
+def test_steps_do_not_show(device: Device) -> None:
+    alike_by_lanes(glowing(64), device, lanes=(8,), share=1, rtol=1e-4, atol=1e-5)
 
 
 def test_a_mirror_shows_glow(device: Device) -> None:

@@ -17,6 +17,7 @@ from clfractal.scene.model import Scene
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
 from tests.environment_maps import write_map
+from tests.render.bits import alike_by_lanes
 from tests.render.media import (
     CAMERA,
     CORNER,
@@ -263,6 +264,10 @@ LAMPS: dict[str, Any] = {
     "samples": 8,
     "anisotropy": 0.5,
 }
+
+
+def test_every_lane_is_alone(device: Device, folder: Path) -> None:
+    alike_by_lanes(medium(folder, file="waves.nrrd", **LAMPS), device, lanes=(8,), share=0.9, mean=0.05)
 
 
 def test_double_precision(device: Device, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
