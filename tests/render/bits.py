@@ -28,7 +28,7 @@ def same_pictures(one: Framebuffer, other: Framebuffer) -> None:
 
 
 def close(a: npt.NDArray[np.float32], b: npt.NDArray[np.float32], off: float = 0.005) -> None:
-    """Colours, points and normals agree to a hundredth in all pixels but a part, and to a thousandth in the mean."""
+    """Colours, points, normals agree to a hundredth in nearly all pixels, and to a thousandth in the mean."""
     chosen = [CHANNELS.index(name) for name in ("R", "G", "B", "A", "P.X", "P.Y", "P.Z", "N.X", "N.Y", "N.Z")]
     difference = np.abs(a[..., chosen] - b[..., chosen])
     assert np.isfinite(difference).all()
@@ -43,8 +43,7 @@ def alike_by_lanes(
     device: Device,
     names: tuple[str, ...] = ("R", "G", "B"),
     *,
-    lanes: tuple[int, ...] = (4, 8, 16),
-    share: float,
+    share: float = 0.95,
     mean: float = 0.01,
     apart: float = np.inf,
     **within: Any,
@@ -52,13 +51,14 @@ def alike_by_lanes(
     """Packets show what single lanes show, and another number type the same light.
 
     Args:
-        share: of the pixels that are the same `within` a tolerance: rounding sends some paths another way.
+        share: of the pixels that are the same `within` a tolerance. Where products are fused with sums
+            rounding sends some paths another way; a mistake in one lane of 16 is more than the usual share.
         mean: by how large a part of it the whole light may differ.
         apart: by how much pixels may differ in the mean.
     """
     one = stacked(shoot(scene, device, channels=names, lanes=1), names)
     assert one.max() > 0.05
-    for each in set(lanes).intersection(accepted_lanes(device, "float32")):
+    for each in accepted_lanes(device, "float32"):
         many = stacked(shoot(scene, device, channels=names, lanes=each), names)
         assert np.isclose(one, many, **{"rtol": 1e-3, "atol": 1e-4, **within}).all(axis=-1).mean() >= share
         assert many.mean() == pytest.approx(one.mean(), rel=mean)

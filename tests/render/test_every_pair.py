@@ -148,8 +148,8 @@ NEEDS: dict[tuple[str, str], dict[str, str]] = {
     ("surface", "layers"): {"lighting": "path"},
     ("volume", "path"): {"transfer": "opacity"},
 }
-# The share of the pixels that are the same, and by how much the mean colour differs, where paths go through a set and so
-# small differences send them other ways: measured are 0.96, 0.47, 0.96, 0.66 and 0.94; else at least 0.98.
+# The share of the pixels that are the same, and by how much the mean colour differs, where paths go through a
+# set, and so small differences send them other ways: measured are 0.96, 0.47, 0.96, 0.66 and 0.94.
 STIRRED = {
     ("glass", "float32"): (0.94, 0.003),
     ("glass", "float64"): (0.4, 0.03),

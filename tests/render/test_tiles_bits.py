@@ -237,7 +237,7 @@ DOUBLE: Variant = ("float64", None)
 def test_lanes_and_number_types_are_close(
     device: Device, scene: Scene, usual: Variant, others: list[Variant], off: float
 ) -> None:
-    """Packets of another width are another program: the last bits differ, and with them what decides at a rim."""
+    """Other packets are another program: the last bits differ, and with them what decides at a rim."""
     whole, *found = (
         stacked(shoot(scene, device, precision, lanes=lanes))
         for precision, lanes in (usual, *others)
@@ -329,7 +329,7 @@ def test_passes_have_the_bits_of_one(
 def test_adaptive_tiles_in_parts_have_the_same_bits(
     kind: str, budget: float, device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """So little time that a launch is one sample of one packet: packets and samples are split, and counted once."""
+    """So little time that a launch is one sample of one packet: both are split, and rays counted once."""
     scene = scene_with(kind, **NOISY)
     plan = plan_of(scene, device)
     spans: list[Span] = []
