@@ -43,7 +43,7 @@ def alike_by_lanes(
     device: Device,
     names: tuple[str, ...] = ("R", "G", "B"),
     *,
-    share: float = 0.95,
+    share: float = 0.98,
     mean: float = 0.01,
     apart: float = np.inf,
     **within: Any,
@@ -52,7 +52,7 @@ def alike_by_lanes(
 
     Args:
         share: of the pixels that are the same `within` a tolerance. Where products are fused with sums
-            rounding sends some paths another way; a mistake in one lane of 16 is more than the usual share.
+            rounding sends some paths another way; a mistake in one lane of 16 shows in more pixels.
         mean: by how large a part of it the whole light may differ.
         apart: by how much pixels may differ in the mean.
     """

@@ -208,7 +208,7 @@ def test_the_eye_sees_the_nearest_ball(device: Device) -> None:
 @pytest.mark.parametrize("mode", [{}, PATHS], ids=["direct", "path"])
 def test_every_lane_is_alone(device: Device, mode: dict[str, Any]) -> None:
     """A rounding may choose another ball now and then."""
-    alike_by_lanes(lit({"count": 300, "radius": 0.01}, 8, **mode), device, share=0.98)
+    alike_by_lanes(lit({"count": 300, "radius": 0.01}, 8, **mode), device)
 
 
 def test_colours_follow_the_trap() -> None:
