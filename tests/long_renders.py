@@ -60,7 +60,7 @@ def interrupted_in_a_kernel(folder: Path, *options: str) -> list[str]:
 
     for _ in range(3):
         status, line, took = interrupt(folder, rendering, {}, *options)
-        assert status == 130
+        assert status == 130, line
         assert not (folder / "out.exr").exists()
         assert journal.exists() == ("--resume" in line), "without a finished tile nothing stays"
         assert took < LIMIT_SECONDS
