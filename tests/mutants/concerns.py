@@ -65,7 +65,7 @@ kernels/formulas/node_proof.h: voxels/
 kernels/voxels/bricks.h: voxels/
 clfractal/geometry/solids.py: voxels/joined_voxels render/joined
 kernels/*/trap*: render/coloring render/joined
-kernels/*/orbit*: formulas/distance render/points render/surface_analytic
+kernels/*/orbit*: formulas/distance render/points render/surface_analytic render/joined
 kernels/*/p[ar]*: render/reconstruction render/tiles_bits device/launch
 kernels/integrators/pixel.h: render/reconstruction render/tiles_bits render/surface_light
 kernels/formulas/points.cl: render/points formulas/distance
@@ -75,7 +75,7 @@ kernels/*/volume*: render/volume_rays render/volume_surface render/planes_in_fog
 kernels/*/voxels*: voxels/ render/volume_surface render/turned_grids
 kernels/integrators/tiles.h: render/tiles_bits render/reconstruction
 kernels/*: numbers/ render/surface_analytic render/surface_light
-clfractal/cli/*: cli bad_input exchange stereo_shell
+clfractal/cli/*: cli bad_input exchange stereo_shell completion
 clfractal/api.py: api stereo_python engine/engine
 clfractal/device/c[ah]*: device/isolate device/cache engine/cancel
 clfractal/device/*: device/ engine/cancel
@@ -83,6 +83,7 @@ clfractal/files/*: files/
 clfractal/formulas/*: formulas/parser formulas/evaluate formulas/opencl formulas/catalog
 clfractal/camera/*: render/view render/stereo_views render/surface_analytic
 clfractal/images/*: render/framebuffer render/framebuffer_store render/compose render/anaglyph render/compose_files
+clfractal/integrators/volume.py: render/volume_surface voxels/lattice render/turned_grids
 clfractal/integrators/*: render/job_data render/few_programs render/points render/surface_light render/volume_surface
 clfractal/scene/grid_place.py: render/turned_grids
 clfractal/scene/given.py: render/turned_grids scene/volume_scenes
@@ -103,6 +104,7 @@ clfractal/viewer/ui_renderer.py: window/
 clfractal/viewer/screens.py: window/
 clfractal/viewer/operators.py: window/
 clfractal/viewer/motion.py: window/
+clfractal/viewer/session.py: viewer/session viewer/preparing viewer/drafts viewer/session_tasks
 clfractal/viewer/*: viewer/studio viewer/session viewer/controls
 clfractal/*: cli api
 """

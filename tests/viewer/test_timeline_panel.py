@@ -21,6 +21,7 @@ from clfractal.viewer.panels import (
     timeline_area,
     timeline_inspector,
     timeline_rows,
+    widgets,
 )
 from clfractal.viewer.panels import timeline as panel
 from clfractal.viewer.playing import Player
@@ -306,6 +307,17 @@ def test_numbers_of_a_key_are_typed() -> None:
         film.stage.type(text)
         film.stage.press(imgui.Key.enter)
     assert film.keys() == {0: 30, 15: 42}
+
+
+def test_how_chosen_keys_go_on_is_picked(monkeypatch: pytest.MonkeyPatch) -> None:
+    film = Film()
+    film.stage.click(film.x(10), film.y("camera.fov"))
+    picked = {"key.way": "linear"}
+    monkeypatch.setattr(widgets, "choose", lambda name, *rest: picked.get(name))
+    film.stage.frame()
+    animation = film.ui.studio.scene.animation
+    assert animation is not None
+    assert [key.interpolation for key in animation.tracks["camera.fov"].keys or ()] == [None, "linear"]
 
 
 def test_a_key_that_is_dragged_by_its_box_passes_its_neighbour() -> None:

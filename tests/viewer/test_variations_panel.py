@@ -157,7 +157,7 @@ def test_new_ones_are_others_and_the_old_pictures_are_given_up(seen: Seen) -> No
     ui, stage, tasks = opened()
     state = settled(ui, stage)
     first, old = [each.changes for each, _ in state.work.found], list(tasks)
-    assert len(old) == COUNT
+    assert len(old) == COUNT == 12
     seen.click(stage, "New")
     state = settled(ui, stage)
     assert [each.changes for each, _ in state.work.found] != first
