@@ -39,6 +39,7 @@ from clfractal.viewer.panels import (
     volume,
     widgets,
 )
+from clfractal.viewer.panels.number_box import Change
 from clfractal.viewer.panels.ui import Ui
 from tests.variants import one_of
 from tests.viewer.panel_harness import INFO, Stage, background, make_ui, opened, screenshot
@@ -248,6 +249,26 @@ def test_stops_are_dragged_added_and_pulled_off_the_strip() -> None:
     assert palette[1].at == pytest.approx(0.25, abs=0.02)  # type: ignore[union-attr]
     stage.drag((left + 0.25 * (right - left), y), (left + 0.25 * (right - left), y + 90))
     assert len(ui.studio.scene.coloring.palette) == 3
+
+
+def test_a_grid_is_filled_once_its_resolution_is_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not at every place of a drag, which would fill a grid each."""
+    ui, _ = make_ui("scenes/stereo_volume.yaml")
+    path, plain, drag = "renderer.resolution.0", widgets.number_box, list[Change]()
+
+    def number_box(boxes: Any, name: str, *rest: Any, **options: Any) -> Change:
+        usual = plain(boxes, name, *rest, **options)
+        return drag.pop(0) if name == path and drag else usual
+
+    monkeypatch.setattr(widgets, "number_box", number_box)
+    stage = Stage(ui, volume.draw)
+    before = ui.studio.scene
+    drag += [Change(value=100.0, dragging=True), Change(value=96.0, dragging=True), Change(ended=True)]
+    stage.frame()
+    stage.frame()
+    assert ui.studio.scene is before
+    stage.frame()
+    assert ui.studio.scene.renderer.resolution == 96  # type: ignore[union-attr]
 
 
 # The transfer function
