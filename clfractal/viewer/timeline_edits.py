@@ -243,9 +243,9 @@ def with_track(animation: Animation, name: str, changes: Mapping[str, Any]) -> A
     word, before = changes.get("interpolation", track.interpolation), track.interpolation
     own = [key for key in track.keys or () if key.interpolation is None]
     if (word == "bezier") != (before == "bezier") and own:
-        ease = _HANDLES.get(before, EASES["ease"]) if word == "bezier" else None
+        ease = _HANDLES.get(before, EASES["ease"])
         update["keys"] = tuple(
-            key.model_copy(update={"handles": (key.handles or ease) if ease else None})
+            key.model_copy(update={"handles": (key.handles or ease) if word == "bezier" else None})
             if key.interpolation is None
             else key
             for key in track.keys or ()

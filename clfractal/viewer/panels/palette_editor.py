@@ -215,14 +215,14 @@ def _strip_events(
     imgui.invisible_button(f"##{path}.strip", imgui.ImVec2(width, _STRIP + 14))
     mouse, hovered = imgui.get_mouse_pos(), imgui.is_item_hovered()
     at = min(max((mouse.x - left) / inner, 0.0), 1.0)
-    near = min(range(len(stops)), key=lambda n: abs(stops[n]["at"] - at))
     off = abs(mouse.y - corner.y - _STRIP / 2) > _FAR and len(stops) > 2
     stops = dragged(
         ui,
         path,
         stops,
         state,
-        near=near if abs(stops[near]["at"] - at) * inner <= _HANDLE + 2 else None,
+        away=[abs(stop["at"] - at) * inner for stop in stops],
+        reach=_HANDLE + 2,
         add=lambda: added(stops, at),
         move=lambda: moved(stops, state["chosen"], at),
         off=off,

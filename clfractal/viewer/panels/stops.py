@@ -33,7 +33,8 @@ def dragged(
     stops: Stops,
     state: dict[str, Any],
     *,
-    near: int | None,
+    away: Sequence[float],
+    reach: float,
     add: Callable[[], tuple[Stops, int]],
     move: Callable[[], tuple[Stops, int]],
     off: bool = False,
@@ -42,12 +43,14 @@ def dragged(
 
     Args:
         state: see `state_of`.
-        near: the stop under the pointer; None: none.
+        away: how far each stop is from the pointer, points.
+        reach: how near it has to be to be taken.
         add, move: the stops with one more, or the chosen one moved, where the pointer is; and that one's number.
         off: whether the pointer is where a stop that is let go is removed.
     """
     if imgui.is_item_activated():
-        if near is not None:
+        near = min(range(len(stops)), key=away.__getitem__)
+        if away[near] <= reach:
             state.update(chosen=near, held=True)
         elif imgui.is_mouse_double_clicked(0) and len(stops) < MOST:
             stops, state["chosen"] = add()

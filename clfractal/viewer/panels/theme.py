@@ -171,13 +171,13 @@ def window(
     if size is not None:
         imgui.set_next_window_size(imgui.ImVec2(*size))
     with measures(**changes):
-        imgui.begin(f"##{name}", None, _STILL | flags)
+        imgui.begin(f"##{name}", None, _IN_ITS_PLACE | flags)
     # (After a mistake in a panel Dear ImGui ends what is open: see `Viewer._draw_panels`.)
     yield
     imgui.end()
 
 
-_STILL = (
+_IN_ITS_PLACE = (
     imgui.WindowFlags_.no_title_bar
     | imgui.WindowFlags_.no_resize
     | imgui.WindowFlags_.no_collapse

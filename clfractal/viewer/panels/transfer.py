@@ -171,14 +171,14 @@ def _graph(ui: Ui, of: Values, stops: Stops, colors: Stops | None) -> None:
     mouse = imgui.get_mouse_pos()
     places = [area.place(stop["at"], stop["opacity"]) for stop in stops]
     distances = [math.dist((each.x, each.y), (mouse.x, mouse.y)) for each in places]
-    near = min(range(len(stops)), key=distances.__getitem__)
     at, opacity = area.value(mouse.x), area.opacity(mouse.y)
     stops = dragged(
         ui,
         path,
         stops,
         state,
-        near=near if distances[near] <= _REACH else None,
+        away=distances,
+        reach=_REACH,
         add=lambda: inserted(stops, at, opacity=opacity),
         move=lambda: (placed(stops, state["chosen"], at, opacity=opacity), state["chosen"]),
         off=not -_FAR < mouse.y - area.y < area.height + _FAR and len(stops) > 1,
@@ -321,13 +321,14 @@ def _strip(ui: Ui, path: str, stops: Stops, low: float, high: float) -> None:
     area = _Area(corner.x + 6, corner.y, wide - 12, _STRIP, low, high)
     mouse = imgui.get_mouse_pos()
     distances = [abs(area.place(stop["at"], 0).x - mouse.x) for stop in stops]
-    near, at = min(range(len(stops)), key=distances.__getitem__), area.value(mouse.x)
+    at = area.value(mouse.x)
     stops = dragged(
         ui,
         path,
         stops,
         state,
-        near=near if distances[near] <= _REACH else None,
+        away=distances,
+        reach=_REACH,
         add=lambda: inserted(stops, at, **{key: color_at(stops, at, key)}),
         move=lambda: (placed(stops, state["chosen"], at), state["chosen"]),
     )
