@@ -48,7 +48,8 @@ class WorkItem:
 @dataclass(slots=True, kw_only=True)
 class Counters:
     """Counts and times: camera rays (all samples), those of them that found anything, distance evaluations and
-    applications of all rays, and lanes that waited for others, in distance evaluations; times in ms."""
+    applications of all rays; lanes that waited for others without a ray, in distance evaluations, and, if that
+    is observed, those with one whose orbit had ended, in applications; times in ms."""
 
     rays: int = 0
     hits: int = 0
@@ -56,6 +57,7 @@ class Counters:
     iterations: int = 0
     bad_distances: int = 0
     waits: int = 0
+    orbit_waits: int = 0
     kernel_ms: float = 0.0
     build_ms: float = 0.0
 

@@ -77,6 +77,7 @@ class Resources:
         on_compile: told a line if a program has to be compiled first.
         token: ends long work, such as the filling of a grid.
         waits: whether what takes long is made here if it is not there yet.
+        counts_waits: whether kernels count how long lanes wait in orbits, which takes about a hundredth of a march.
     """
 
     device: Device
@@ -84,6 +85,7 @@ class Resources:
     on_compile: Callable[[str], None] | None = None
     token: CancelToken | None = None
     waits: bool = True
+    counts_waits: bool = False
 
     def once(self, key: str, make: Callable[[], T], *, quick: bool = False) -> T:
         """As `Kept.once`; `quick`: made at once, whoever waits.

@@ -105,6 +105,7 @@ MARCH = Struct(
         Field("soft_lights", "int", 0, "1: lights have sizes, and shadow rays go to places of them"),
         Field("state_at", "int", len(PARTS), "where what a pixel carries is kept, STATE_; below 0: not"),
         Field("firefly_limit", "real", 0, "brightest that mirrored light or the environment's may be"),
+        Field("counts_waits", "int", 0, "1: applications that lanes wait in orbits of others are counted"),
     ],
 )
 
@@ -172,6 +173,8 @@ def march_record(
     environment: PackedEnvironment | None = None,
     on_set: SetLights | None = None,
     places: Sequence[int] | None = None,
+    *,
+    counts_waits: bool = False,
 ) -> Record:
     """The settings of the march, and of the rays that a sample sends.
 
@@ -179,6 +182,7 @@ def march_record(
 
     Args:
         places: where what a pixel carries is kept, see `state_places`.
+        counts_waits: whether the statistic `orbit_waits` is counted; else it is 0.
     """
     renderer = scene.surface
     center, radius = scene.bounds
@@ -249,5 +253,6 @@ def march_record(
         "soft_lights": int(not along_paths(scene) and any(light.has_size for light in single_lights(scene))),
         "state_at": [-1] * len(PARTS) if places is None else places,
         "firefly_limit": largest if limit is None else min(limit, largest),
+        "counts_waits": int(counts_waits),
     }
     return MARCH.value(precision, values)

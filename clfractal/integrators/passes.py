@@ -40,7 +40,7 @@ SAMPLING = Struct(
 FILTERS = ("box", "tent", "blackman_harris")
 FILTER_WIDTHS = {"box": 1.0, "tent": 2.0, "blackman_harris": 3.0}
 
-STATISTICS = ("rays", "hits", "steps", "iterations", "bad_distances", "waits")
+STATISTICS = ("rays", "hits", "steps", "iterations", "bad_distances", "waits", "orbit_waits")
 """The statistics that a packet counts, in the kernel's order."""
 
 # What the mode of a pass asks for, as bits.

@@ -107,7 +107,15 @@ class SurfaceKernel(TileKernel):
         on_set, body = set_lights_of(scene), Body.of(scene)
         of_maps, before, tables = self._tables()
         return [
-            march_record(scene, precision, self.plan.divider, packed, on_set, state_places(scene, self.plan)),
+            march_record(
+                scene,
+                precision,
+                self.plan.divider,
+                packed,
+                on_set,
+                state_places(scene, self.plan),
+                counts_waits=self.resources.counts_waits,
+            ),
             body.records(precision),
             body.constants(precision),
             records.material_record(scene, precision, packed),

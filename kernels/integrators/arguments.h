@@ -38,6 +38,9 @@
 #define STAGE_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects, settings->point_count > 1}
 // That of a march, which knows nothing of objects beside the set; `known`: whether something may be known of rays.
 #define MARCH_QUEUE(known) {rays, met, wave, turns, queue_stride, settings->met_numbers, 0, known}
-// The counts of the launch's first packet.
-#define STATISTICS_HERE (statistics + STATISTICS * (first_tile * (TILE * TILE / LANES) + first_packet))
+// The counts of one of the wave's packets, so that those of no packet grow beyond numbers: every work-item's share of rays has another.
+#define PACKET_HERE (ITEM % (wave / LANES))
+#define STATISTICS_HERE                                                                                                    \
+    (statistics + STATISTICS * ((first_tile + PACKET_HERE / (end_packet - first_packet)) * (TILE * TILE / LANES) +         \
+                                first_packet + PACKET_HERE % (end_packet - first_packet)))
 #define WAS_CANCELLED (*(volatile __constant const int *)&sampling->cancelled)

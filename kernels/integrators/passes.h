@@ -104,8 +104,10 @@ INLINE void pass_write(pass s, const place_in_pass *here, pixel *p) {
     if (s.mode & PASS_KEEP) kept_pixel(here->kept, s.slots + CHANNEL_COUNT, 1, p);
 }
 
-// Sets the count to which marches add the lanes that wait: once in a launch, unless it continues the one before.
-INLINE void count_waits_from(pass s, const place_in_pass *here) { if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = 0u; }
+// Sets the counts to which marches add the lanes that wait: once in a launch, unless it continues the one before.
+INLINE void count_waits_from(pass s, const place_in_pass *here) {
+    if (!(s.mode & PASS_ADD)) here->sums[STATISTIC_WAITS] = here->sums[STATISTIC_ORBIT_WAITS] = 0u;
+}
 
 // Counts what the launch has done for the packet, or adds to what was counted.
 INLINE void pass_count(const place_in_pass *here, int add, real samples, real hits, counters cost) {

@@ -15,7 +15,7 @@ STAGE(walk_inside) {
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
     const world w = WORLD;
-    const int waits = walk_share(mine, q, state, wave + STATE_PADDING, bounce, w, orbit, k);
+    const lane_waits waits = walk_share(mine, q, state, wave + STATE_PADDING, bounce, w, orbit, k);
     look_along_share(mine, waits, q, STATISTICS_HERE, settings, orbit, k);
 }
 

@@ -187,8 +187,8 @@ INLINE void walk_puts(const march *m, const walk *a, const int *places, uint end
     lanes_put(a->number, q.rays + RAY_OBJECT_NUMBER * q.stride, places, ended);
 }
 
-// Walks the paths of a share of the queue; the result is how many lanes have waited, in steps.
-INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, int bounce, world w, orbit_record orbit,
+// Walks the paths of a share of the queue; the result is how long lanes have waited.
+INLINE lane_waits walk_share(share mine, queue q, __global scalar *state, int stride, int bounce, world w, orbit_record orbit,
                       constants k) {
     share left = mine;
     march m = {0};
@@ -197,7 +197,7 @@ INLINE int walk_share(share mine, queue q, __global scalar *state, int stride, i
     lanes_begin(&m, places);
     for (int waits = 0;;) {
         const uint waiting = lanes_waiting(&m, &left, places, q, GOAL_WALK, w.settings);
-        if (waiting == ALL_LANES) return waits;
+        if (waiting == ALL_LANES) return (lane_waits){waits, (int)lanes_sum(to_reals(m.waits))};
         waits += bits_count(waiting);
         walk_takes(&a, places, lanes_bits(m.active & equal(m.found.steps, R(0.0))), state, w.settings->state_at, stride);
         const mask before = m.active;

@@ -40,9 +40,9 @@ INLINE void look_inside(queue q, int at, march_record settings, orbit_record orb
 }
 
 // The same for a packet's share, which has been marched; `waits` are counted in the launch's statistics.
-INLINE void look_along_share(share mine, int waits, queue q, __global uint *statistics, march_record settings,
+INLINE void look_along_share(share mine, lane_waits waits, queue q, __global uint *statistics, march_record settings,
                              orbit_record orbit, constants k) {
     if (LANES == 1) return;
     for (int at = mine.next; at < mine.end; at += LANES) look_inside(q, at, settings, orbit, k);
-    atomic_add(statistics + STATISTIC_WAITS, (uint)waits);
+    COUNT_LANE_WAITS(waits, statistics)
 }

@@ -9,7 +9,7 @@ STAGE(march_inside) {
     const queue q = inside_of(rays, met, wave, queue_stride, settings, 0);
     const share mine = share_of_item(ITEM, slice, q);
     if (mine.next >= mine.end || WAS_CANCELLED) return;
-    const int waits = march_share(mine, q, goal, settings, orbit, k);
+    const lane_waits waits = march_share(mine, q, goal, settings, orbit, k);
     look_along_share(mine, waits, q, STATISTICS_HERE, settings, orbit, k);
 }
 

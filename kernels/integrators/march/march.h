@@ -100,6 +100,7 @@ INLINE void march_measure(march *m, sight *s, int goal, march_record settings) {
     s->sure = s->radius;
     if (HOLLOWS) march_blind(m, s, settings);
     s->near = pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius);
+    if (settings->counts_waits) m->waits += orbit_waits(m->active, s->here.end.count);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }

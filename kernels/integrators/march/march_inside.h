@@ -20,6 +20,7 @@ typedef struct {
     crossing found;
     real t, low, high;       // the present place; the last place inside, and the first one outside after it
     mask entered, left, narrow;
+    mask waits;              // of each lane, see orbit_waits: of all its rays
     real height, tries;      // over the exit, where light is computed
 } march;
 

@@ -17,6 +17,7 @@ typedef struct {
     real limit;       // one that a step saw which was too long: what is before it is looked at first, and no step passes it
     real slope;       // of the distance along the ray, over the last steps
     real radius_before, step_before;
+    mask waits;       // of each lane, see orbit_waits: of all its rays
     mask landing;     // the last step led to where the solid is expected
     // Of formulas without a scalar rule, whose hits are proved, and which may have sheets (see passed.h and proof.h):
     real facing;      // the cosine between the gradient at the last point before a surface and the ray

@@ -23,6 +23,7 @@ typedef struct {
     real t, pace;
     real low, high;   // the last points seen outside and inside
     mask seen_outside, seen_inside;
+    mask waits;       // of each lane, see orbit_waits: of all its rays
 } march;
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.

@@ -5,14 +5,14 @@
 #include "integrators/arguments.h"
 #include "integrators/march/surface_at.h"
 
-// Nobody counts the steps that lanes of cones have waited.
+// Nobody counts how long lanes of cones have waited.
 #define MARCH_SHARES(known)                                                                        \
     const queue q = MARCH_QUEUE(known);                                                            \
     const share mine = share_of_item(ITEM, slice, q);                                              \
     if (mine.next >= mine.end || WAS_CANCELLED) return;                                            \
-    const int waits = march_share(mine, q, goal, settings, orbit, k);                              \
+    const lane_waits waits = march_share(mine, q, goal, settings, orbit, k);                              \
     look_at_share(mine, q, goal, settings, orbit, k);                                              \
-    if (LANES > 1 && goal != GOAL_CONE) atomic_add(STATISTICS_HERE + STATISTIC_WAITS, (uint)waits)
+    if (goal != GOAL_CONE) COUNT_LANE_WAITS(waits, STATISTICS_HERE)
 #define LOOK_AT_SURFACES(known)                                                                    \
     const queue q = MARCH_QUEUE(known);                                                            \
     if (ITEM < q.turns * q.wave && !WAS_CANCELLED) look_at(q, ITEM, settings, orbit, k)

@@ -1,5 +1,6 @@
 // What a march is after, and what it finds.
 #include "integrators/camera.h"
+#include "integrators/march/waits.h"
 
 // The result of a march.
 typedef struct {
@@ -36,6 +37,7 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
 #define MARCH_TESTS(m, point, here)                                                                 \
     const vec point = vec_along((m)->r.origin, (m)->t, (m)->r.direction);                           \
     const orbit_end here = orbit_solid(point, (m)->active, orbit->iterations, orbit, k);            \
+    if (settings->counts_waits) (m)->waits += orbit_waits((m)->active, here.count);                 \
     (m)->found.steps += pick((m)->active, R(1.0), R(0.0));                                          \
     (m)->found.count += pick((m)->active, here.count, R(0.0))
 

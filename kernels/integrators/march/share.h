@@ -82,8 +82,8 @@ INLINE uint lanes_waiting(march *m, share *left, int *places, queue q, int goal,
     return lanes_bits(~m->active);
 }
 
-// Marches a share of a queue; the result is how many lanes have waited, in steps.
-INLINE int march_share(share mine, queue q, int goal, march_record settings, orbit_record orbit, constants k) {
+// Marches a share of a queue; the result is how long lanes have waited.
+INLINE lane_waits march_share(share mine, queue q, int goal, march_record settings, orbit_record orbit, constants k) {
     share left = mine;
     march m = {0};
     int places[LANES];
@@ -101,7 +101,12 @@ INLINE int march_share(share mine, queue q, int goal, march_record settings, orb
         idle += bits_count(others);
         waiting &= others;
 #endif
-        if (waiting == ALL_LANES) return waits;
+        if (waiting == ALL_LANES) {
+#if ABREAST > 1
+            m.waits += n.waits;
+#endif
+            return (lane_waits){waits, (int)lanes_sum(to_reals(m.waits))};
+        }
         waits += idle;
 #if ABREAST > 1
         march_step_both(&m, &n, goal, settings, orbit, k);

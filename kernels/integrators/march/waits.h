@@ -1,0 +1,44 @@
+// How long lanes of a packet have waited for others while rays marched. All lanes of a packet go on until its longest one ends.
+
+typedef struct {
+    int steps;         // lanes without a ray: in steps of the others
+    int applications;  // lanes with a ray, whose orbit had ended: in applications of the packet's longest orbit
+} lane_waits;
+
+// The largest of whole numbers of the lanes: of their halves, theirs, and so on.
+#define LARGER(a, b) ((a) < (b) ? (b) : (a))
+INLINE INTEGER lanes_most(mask value) {
+#if LANES == 1
+    return value;
+#else
+#if LANES == 16
+    const JOIN(INTEGER, 8) eight = LARGER(value.lo, value.hi);
+#elif LANES == 8
+    const mask eight = value;
+#endif
+#if LANES >= 8
+    const JOIN(INTEGER, 4) four = LARGER(eight.lo, eight.hi);
+#else
+    const mask four = value;
+#endif
+    const JOIN(INTEGER, 2) two = LARGER(four.lo, four.hi);
+    return LARGER(two.x, two.y);
+#endif
+}
+
+// For how many applications each of these lanes has waited, whose orbits had `count`; orbits of lanes that had none have the least.
+INLINE mask orbit_waits(mask lanes, real count) {
+#if LANES == 1
+    return 0;
+#else
+    const mask whole = CONVERT(OF_LANES(INTEGER), count);
+    return lanes & (lanes_most(whole) - whole);
+#endif
+}
+
+// Adds what a work-item's share has waited to the counts of a packet. A single lane waits for nobody.
+#define COUNT_LANE_WAITS(waits, statistics)                                                 \
+    if (LANES > 1) {                                                                       \
+        atomic_add((statistics) + STATISTIC_WAITS, (uint)(waits).steps);                   \
+        atomic_add((statistics) + STATISTIC_ORBIT_WAITS, (uint)(waits).applications);      \
+    }
