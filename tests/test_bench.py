@@ -17,9 +17,9 @@ from benchmarks.rivals.base import MissingError
 from benchmarks.rivals.mandelbulber import Mandelbulber
 from benchmarks.rivals.vtk_volume import VtkVolume
 from benchmarks.runtimes import Runtime
-from clfractal.cli import bench
+from clfractal.cli import bench, bench_stages
 from clfractal.cli.shell import Shell
-from clfractal.device.select import choose
+from clfractal.device.select import Device, choose
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.scene.surface import SurfaceRenderer
 
@@ -199,3 +199,50 @@ def test_the_table_of_growth(monkeypatch: pytest.MonkeyPatch) -> None:
         ("cut plane", "0.01 MP"),
     ]
     assert all(line.device_ms > 0 and line.processor_ms > 0 for line in lines)
+
+
+def test_the_table_of_stages(device: Device) -> None:
+    """A small picture's, as plain data and as text."""
+    scene = scene_of("mandelbulb8-shadow", "image.width=64", "image.height=64")
+    row = bench_stages.picture_row("mandelbulb8-shadow", scene, device, peak=100.0, repetitions=3)
+    assert row.rays == 64 * 64
+    assert row.ms == pytest.approx(sum(stage.ms for stage in row.stages) + row.between_ms)
+    assert sum(stage.share for stage in row.stages) == pytest.approx(1.0 - row.between_ms / row.ms)
+    assert row.applications_ms == pytest.approx(
+        row.applications * operations_per_application(scene.chain) / 100e9 * 1e3
+    )
+    assert (row.busy_in_march is None) == (row.busy_in_orbits is None) == (row.lanes == 1)
+    if row.busy_in_orbits is not None:
+        assert 0 < row.busy_in_orbits < 1
+        assert row.waited_ms / row.applications_ms == pytest.approx(1 / row.busy_in_orbits - 1)
+    report = bench.report_of(device, 100.0, [row])
+    assert json.loads(json.dumps(report))["rows"][0]["stages"][0]["name"] == row.stages[0].name
+    lines = bench_stages.table(report)
+    assert lines[0] == bench.headline(report)
+    assert lines[2].split() == ["mandelbulb8-shadow", "launches", "ms", "share"]
+    for stage, line in zip(row.stages, lines[3:], strict=False):
+        assert line.startswith(f"{stage.name} ")
+        assert line.split()[-3] == str(stage.launches)
+    every = lines[4 + len(row.stages)].split()
+    assert every == ["all", str(sum(stage.launches for stage in row.stages)), f"{row.ms:.2f}", "100.0%"]
+    assert lines[-1] == (
+        f"for a pixel {row.state_bytes} bytes of state, {row.queue_bytes} of rays and of what these met"
+    )
+
+
+def test_stages_of_wanted_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def row(name: str, *_: object) -> bench_stages.PictureRow:
+        stage = bench_stages.StageRow("cut_plane", 1, 2.0, 1.0)
+        return bench_stages.PictureRow(name, 16, 2.0, 0.0, 9, 99, 1.0, 0.0, None, None, 0, 0, (stage,))
+
+    monkeypatch.setattr(bench_stages, "picture_row", row)
+    monkeypatch.setattr(bench_stages, "fma_peak", lambda device, precision: 100.0)
+    report = tmp_path / "stages.json"
+    shell = Shell(owns_process=False)
+    shell.quiet = True
+    for wanted in ((), ("hast2-plane256",)):
+        bench_stages.run(device=None, json_file=report, shell=shell, wanted=wanted)
+        found = [one["name"] for one in json.loads(report.read_text())["rows"]]
+        assert found == [name for name in bench.ROWS if name in wanted or not wanted]
+    with pytest.raises(clfractal.ClfractalError, match="--row: unknown row 'shell-to-png'"):
+        bench_stages.run(device=None, json_file=None, shell=shell, wanted=("shell-to-png",))

@@ -9,10 +9,10 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clfractal.cli import bench_frames as frames
 from clfractal.cli.shell import Shell
@@ -32,6 +32,9 @@ from clfractal.integrators.volume import settings_of
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.fill import fill_grid
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
 
 REPETITIONS = 7
 STILL_REPETITIONS = 3
@@ -127,12 +130,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
         DeviceError: there is no device, or it failed.
         FileError: the file cannot be written.
     """
-    for name in wanted:
-        if name not in row_names():
-            raise ClfractalError(f"unknown row {name!r}; known: {', '.join(row_names())}", Where("--row"))
-    if json_file is not None:
-        check_output(json_file, (json_file.suffix.lower(),))
-    names = [name for name in row_names() if name in wanted or not wanted]
+    names = chosen_rows(wanted, row_names(), json_file)
     chosen = choose(device)
     shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
     peak = fma_peak(chosen, "float32")
@@ -150,13 +148,47 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
             text, changes, repetitions = ROWS[name]
             rows.append(_render_row(name, load_scene(text, overrides=changes), chosen, peak, repetitions))
         shell.say(f"{name}: {rows[-1].ms:.1f} ms")
-    report = {
-        "device": chosen.info.name,
-        "platform": f"{chosen.info.platform}, {chosen.info.version}",
+    tell(report_of(chosen, peak, rows), table, json_file, shell)
+
+
+def chosen_rows(wanted: Sequence[str], known: Sequence[str], json_file: Path | None) -> list[str]:
+    """The wanted ones of known rows, or every one.
+
+    Raises:
+        ClfractalError: there is no such row.
+        FileError: the file cannot be written.
+    """
+    for name in wanted:
+        if name not in known:
+            raise ClfractalError(f"unknown row {name!r}; known: {', '.join(known)}", Where("--row"))
+    if json_file is not None:
+        check_output(json_file, (json_file.suffix.lower(),))
+    return [name for name in known if name in wanted or not wanted]
+
+
+def report_of(device: Device, peak: float, rows: Sequence[DataclassInstance]) -> dict[str, Any]:
+    """What was measured, as plain data."""
+    return {
+        "device": device.info.name,
+        "platform": f"{device.info.platform}, {device.info.version}",
         "peak_gflops_float32": round(peak, 1),
         "rows": [asdict(row) for row in rows],
     }
-    for line in table(report):
+
+
+def headline(report: Mapping[str, Any]) -> str:
+    """The device, and how fast it is at best."""
+    return f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s"
+
+
+def tell(
+    report: dict[str, Any],
+    lines: Callable[[Mapping[str, Any]], list[str]],
+    json_file: Path | None,
+    shell: Shell,
+) -> None:
+    """Prints a report as `lines` of text, and writes it as JSON if a file is named."""
+    for line in lines(report):
         shell.print(line)
     if json_file is not None:
         with atomic_writer(json_file) as beside:
@@ -166,7 +198,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
 def table(report: Mapping[str, Any]) -> list[str]:
     """The report as lines of text."""
     lines = [
-        f"{report['device']}; {report['platform']}; FMA peak {report['peak_gflops_float32']:.0f} GFLOP/s",
+        headline(report),
         f"{'row':24} {'ms':>8} {'wall ms':>8} {'Mrays/s':>8} {'Miter/s':>8} {'steps/ray':>9} {'waiting':>8} "
         f"{'of peak':>8} {'lanes':>5}",
     ]

@@ -142,10 +142,14 @@ def bench(
         list[str] | None,
         typer.Option("--row", metavar="NAME", help="Measure only this row; repeatable."),
     ] = None,
+    stages: Annotated[
+        bool, typer.Option("--stages", help="Print instead what each stage of the rows' pictures takes.")
+    ] = False,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
     """Measure this machine's speed and print a table."""
-    from clfractal.cli.bench import run
+    from clfractal.cli import bench, bench_stages
 
+    run = bench_stages.run if stages else bench.run
     return lambda: run(device=device, json_file=json_file, shell=context.obj, wanted=rows or ())

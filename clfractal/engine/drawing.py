@@ -18,6 +18,7 @@ from clfractal.device.launch import Pace
 from clfractal.device.select import Device, is_simulator
 from clfractal.device.threads import ending_together
 from clfractal.device.watched import Watched, is_watched
+from clfractal.engine.observer import Observer
 from clfractal.engine.stages import CAPACITY, Span, Wave, group_of, number_count, wave_of
 from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.kept import Resources
@@ -121,6 +122,7 @@ class Drawing:
         self.wave = Wave(0, 0, [])
         self.build_ms = 0.0
         self.pace = Pace(1.0)
+        self.observer: Observer | None = None
         self._kernels: Lease | None = None
         self._kernel: TileKernel | None = None
         self._stages: dict[tuple[int, int], list[Stage]] = {}
@@ -175,6 +177,8 @@ class Drawing:
             named = [(made, text.kernels) for text, made in zip(self._texts, built, strict=True)]
             self._kernels = Lease(self.device, named, 2 + number_count(kernel))
         self._kernel, self._stages = kernel, {}
+        if self.observer is not None:
+            self.observer.sees(kernel)
 
     def wanted(self, view: PlannedView, resources: Resources) -> list[Wanted]:
         """The programs of all stages that pictures of the view's formula may have; nothing is built. Not for volumes."""
@@ -306,7 +310,10 @@ class Drawing:
                 each = group[0] * (share if stage.over == "rays" else lanes)
                 size = (-(-rays // each) * group[0],)
         kernel.set_args(*arguments, *numbers)
-        return cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
+        event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
+        if self.observer is not None:
+            self.observer.launched(stage, event)
+        return event
 
     def _divide(self, kernel: TileKernel, tiles: int) -> None:
         """Into packets, groups and waves."""

@@ -14,6 +14,7 @@ from clfractal.device.launch import BUDGET_SECONDS, IN_FLIGHT, Part, in_launches
 from clfractal.device.select import Device, shown_size
 from clfractal.engine.drawing import SLOTS, TILE_PIXELS, Drawing, OutputBuffers
 from clfractal.engine.job import Job
+from clfractal.engine.observer import Observer
 from clfractal.engine.run import NO_PIXELS, NO_TILES, Counters, Result, Tiles, WorkItem
 from clfractal.engine.stages import Span
 from clfractal.images.tiles import TileGrid
@@ -48,7 +49,8 @@ class LocalExecutor:
 
     `outlet`, if it is set, takes the tiles on the device (see `Outlet`); results then have no framebuffers and no
     statistics. `supply`, if it is set, gives each launch its tiles; an item then only tells which ones it may give.
-    `waits` is whether programs are built and grids filled that are not there yet; else there is `NotReady`.
+    `waits` is whether programs are built and grids filled that are not there yet; else there is `NotReady`. `observer`, if
+    it is set, sums what each stage takes, and lanes that wait in orbits are counted.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class LocalExecutor:
         self.outlet: ViewOutlet | None = None
         self.supply: Supply | None = None
         self.waits = True
+        self.observer: Observer | None = None
         self._outputs = OutputBuffers(device)
         self._drawings: dict[int, Drawing] = {}
 
@@ -198,7 +201,10 @@ class LocalExecutor:
     def _drawing(self, number: int, view: PlannedView, tiles: int, token: CancelToken | None) -> Drawing:
         # Put back only when it is complete: one whose update failed is half of each view.
         drawing = self._drawings.pop(number, None) or Drawing(self.device, self._outputs)
-        resources = Resources(self.device, self.kept, self.tell, token, self.waits)
+        drawing.observer = self.observer
+        resources = Resources(
+            self.device, self.kept, self.tell, token, self.waits, counts_waits=self.observer is not None
+        )
         drawing.update(view, resources, tiles=tiles)
         self._drawings[number] = drawing
         return drawing

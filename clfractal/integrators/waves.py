@@ -47,7 +47,8 @@ from clfractal.shading.maps import (
 )
 
 # What a march is after, as in `kernels/integrators/march/rays.h`.
-GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(5)
+GOALS = ("surface", "shadow", "touch", "point", "cone")
+GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE = range(len(GOALS))
 # Rays that a work-item marches: a packet of lanes, which take them in turn, or one lane.
 PACKET_RAYS, LANE_RAYS = 1024, 4
 _LANE_GROUP = 64
@@ -171,6 +172,11 @@ OF_SINGLE_LANES = (
     "look_inside_set",
     "look_where_walks_end",
 )
+
+
+def stage_name(stage: Stage) -> str:
+    """A stage's kernel; of a march also what it is after."""
+    return f"{stage.kernel} {GOALS[stage.numbers['goal']]}" if "goal" in stage.numbers else stage.kernel
 
 
 def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
