@@ -110,14 +110,18 @@ def load_kept(device: Device, kept: bytes, text: str, flags: Sequence[str]) -> A
     """
     if not driver_files.is_packed(kept):
         return load_binary(device, kept, flags)
-    driver_files.unpack(kept)
+    binary = driver_files.binary_in(kept)
     try:
-        return compile_source(device, text, flags)
+        with driver_files.laid_out(kept):
+            program = load_binary(device, binary, flags) if binary else compile_source(device, text, flags)
     except (BuildFailureError, DeviceError) as error:
         drivers_folder.check_room()
         if isinstance(error, DeviceError):
             raise
         return None
+    if program is None:
+        drivers_folder.check_room()
+    return program
 
 
 def compile_and_keep(
@@ -125,8 +129,7 @@ def compile_and_keep(
 ) -> tuple[Any, bytes]:
     """The program, after its first launches, and what to keep of it, which may be empty: files of the driver or a binary.
 
-    For a binary PoCL compiles every kernel once more, for any size of work-group: a renderer would take twice as long to
-    build. With its files it finds the machine code that a first launch made, by the program's text.
+    Of PoCL both are kept, see `driver_files`.
 
     Raises:
         BuildFailureError: with the compiler's log.
@@ -137,7 +140,15 @@ def compile_and_keep(
         return program, binary_of(program)
     with driver_files.recorded() as folders:
         program = _compiled(device, text, flags, warm)
-    return program, driver_files.packed(tuple(folders)) or binary_of(program)
+    binary = _loadable(device, program, flags, folders)
+    return program, driver_files.packed(folders, binary) or binary_of(program)
+
+
+def _loadable(device: Device, program: Any, flags: Sequence[str], folders: Sequence[str]) -> bytes:
+    """The binary that PoCL gives of a program without compiling it again; empty if it cannot load it itself."""
+    with driver_files.stand_ins(folders) as found:
+        binary = binary_of(program) if found else b""
+        return binary if binary and load_binary(device, binary, flags) is not None else b""
 
 
 def _compiled(device: Device, text: str, flags: Sequence[str], warm: Sequence[Warm]) -> Any:

@@ -28,7 +28,7 @@ LEAST_FILE_SIZE = 4 << 20
 """Bytes; the largest programs take half of that, and PoCL keeps several files of each."""
 
 _REMARK_SECONDS = 1.5  # longer than a failing build takes, so that no remark precedes an error
-_FORMAT = 5  # of what is kept under a key
+_FORMAT = 6  # of what is kept under a key
 _TURN_SECONDS = 0.02
 _TOLD_BY_COMPILERS = "error:"  # in the log of a text that is wrong
 _turns: WeakValueDictionary[str, Any] = WeakValueDictionary()  # locks, as long as somebody needs them

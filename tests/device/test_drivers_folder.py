@@ -184,7 +184,8 @@ def test_children_leave_nothing(device: Device, empty_cache: Path) -> None:
     assert not list(root.glob("job-*"))
 
 
-def test_machine_code_that_is_made_later_is_kept_too(device: Device, empty_cache: Path) -> None:
+@pytest.mark.parametrize("loaded", [False, True])
+def test_machine_code_that_is_made_later_is_kept_too(device: Device, empty_cache: Path, loaded: bool) -> None:
     """PoCL makes more of it at a launch with another size of work-group; the next process must not make it again."""
     if not is_pocl(device.info):
         pytest.skip("other drivers have it from the start")
@@ -192,6 +193,10 @@ def test_machine_code_that_is_made_later_is_kept_too(device: Device, empty_cache
     text += "__kernel void twice(__global int *a) { a[get_global_id(0)] *= 2; }\n"
     warm = Warm("twice", (8,), (8,), (Argument("buffer", 32),))
     program = build(device, text, flags=(), warm=[warm], isolated=False)
+    if loaded:
+        device.loaded.clear()
+        program = build(device, text, flags=(), warm=[warm])
+        assert program.cached
     (entry,) = empty_cache.rglob("*.bin")
 
     def kept() -> set[str]:
@@ -210,9 +215,11 @@ def test_machine_code_that_is_made_later_is_kept_too(device: Device, empty_cache
     assert kept() == before
     driver_files.keep_new()
     assert kept() == before | {"16"}
+    device.loaded.clear()
+    assert build(device, text, flags=(), warm=[warm]).cached
 
 
 def test_a_name_that_leads_elsewhere_is_not_written(fresh: Path) -> None:
     payload = driver_files.MAGIC + b'[["CB/x"], [["../../evil", 4]]]\nevil'
-    with pytest.raises(ValueError, match="leads out"):
-        driver_files.unpack(payload)
+    with pytest.raises(ValueError, match="leads out"), driver_files.laid_out(payload):
+        pass

@@ -108,6 +108,22 @@ def test_a_first_launch_makes_machine_code_once(device: Device, empty_cache: Pat
     assert _triples(program)
 
 
+def test_a_kept_program_is_loaded_without_a_compiler(
+    device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """PoCL's compiler reads the text and all headers of its own only to find out that it knows them."""
+    text = f"__constant long unique = {time.time_ns()};\n" + _TRIPLE
+    build(device, text, flags=_FLAGS, warm=[_WARM], isolated=False)
+    device.loaded.clear()
+    monkeypatch.setattr(compiler, "compile_source", raising(AssertionError("the compiler was asked")))
+    monkeypatch.setattr(isolate, "run", raising(AssertionError("a process was started")))
+    program = build(device, text, flags=_FLAGS, warm=[_WARM])
+    assert program.cached
+    # What stood in for machine code for any size of work-group is not there for a launch to find.
+    assert not list(drivers_folder.path().glob("??/*/triple/0-0-0"))
+    assert _triples(program)
+
+
 def test_a_driver_without_a_cache_gives_binaries(
     device: Device, empty_cache: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
