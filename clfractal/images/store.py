@@ -81,13 +81,7 @@ class JournalFramebuffer:
             FileError: the journal cannot be written (a full disk).
         """
         check_tile(array, self.grid.tile(tile_index), self.channels)
-        number = 0
-        if render_device is not None:
-            number = self.provenance.number(render_device)
-            if number not in self.journal.notes:
-                self.journal.note(number, render_device.as_data())
-        self.journal.append(tile_index, array, number)
-        self.provenance.of_tiles[tile_index] = number
+        self._append(tile_index, array, self._number(render_device))
 
     def put_tiles(
         self, indices: npt.NDArray[np.int32], framebuffer: Floats, render_device: RenderDevice | None = None
@@ -100,10 +94,23 @@ class JournalFramebuffer:
         Raises:
             FileError: the journal cannot be written (a full disk).
         """
-        for index, array in zip(indices.tolist(), framebuffer, strict=True):
-            tile = self.grid.tile(index)
-            top, left = tile.y % TILE, tile.x % TILE
-            self.put(index, array[:, top : top + tile.height, left : left + tile.width], render_device)
+        number, boxes = self._number(render_device), self.grid.boxes(indices).tolist()
+        for index, (x, y, width, height), array in zip(indices.tolist(), boxes, framebuffer, strict=True):
+            top, left = y % TILE, x % TILE
+            self._append(index, array[:, top : top + height, left : left + width], number)
+
+    def _number(self, render_device: RenderDevice | None) -> int:
+        """A device's number in the journal, which notes it; 0: there is only one."""
+        if render_device is None:
+            return 0
+        number = self.provenance.number(render_device)
+        if number not in self.journal.notes:
+            self.journal.note(number, render_device.as_data())
+        return number
+
+    def _append(self, tile_index: int, array: Floats, number: int) -> None:
+        self.journal.append(tile_index, array, number)
+        self.provenance.of_tiles[tile_index] = number
 
     def bands(self) -> Bands:
         """The picture from top to bottom, one row of tiles at a time: (first_row, channel -> rows).
@@ -114,16 +121,16 @@ class JournalFramebuffer:
         grid, region = self.grid, self.region
         fills = np.array([CHANNELS[name].fill for name in self.channels], dtype=np.float32)
         for row in range(grid.rows):
-            first = grid.tile(row * grid.columns)
-            band = np.empty((len(self.channels), first.height, region.width), dtype=np.float32)
+            indices = range(row * grid.columns, (row + 1) * grid.columns)
+            boxes = grid.boxes(indices).tolist()
+            top, height = boxes[0][1], boxes[0][3]
+            band = np.empty((len(self.channels), height, region.width), dtype=np.float32)
             band[:] = fills[:, None, None]
-            for index in range(first.index, first.index + grid.columns):
+            for index, (x, _, width, _) in zip(indices, boxes, strict=True):
                 if self.done[index]:
-                    tile = grid.tile(index)
-                    left = tile.x - region.x
-                    pixels = self.journal.tile(index)[:, : tile.height, : tile.width]
-                    band[:, :, left : left + tile.width] = pixels
-            yield first.y, dict(zip(self.channels, band, strict=True))
+                    left = x - region.x
+                    band[:, :, left : left + width] = self.journal.tile(index)[:, :height, :width]
+            yield top, dict(zip(self.channels, band, strict=True))
 
     def _noted_provenance(self) -> Provenance:
         """Those of an earlier run."""
