@@ -44,12 +44,12 @@ def main() -> None:
         shell = Shell(owns_process=True)
         shell.tell_warnings()
         status = run(sys.argv[1:], shell)
+        _clear_away()
     except KeyboardInterrupt:
         # While this is handled the traceback keeps every object of the driver alive: none is waited for.
         last_words()
         _clear_away()
         os._exit(interrupt.status())
-    _clear_away()
     os._exit(status)
 
 
@@ -95,4 +95,10 @@ def run(arguments: Sequence[str], shell: Shell) -> int:
 
         return call(arguments, shell)
     except Exception as error:
+        from clfractal.cli import interrupt
+
+        if interrupt.came():
+            # Its KeyboardInterrupt became something else on the way: where it met a lock that was just being waited for,
+            # that is released twice; and the thread that ends by force may have closed a file under the clean-up.
+            raise KeyboardInterrupt from error
         return shell.fail(error)

@@ -30,7 +30,7 @@ SIGNALS = tuple(
     if hasattr(signal, name)
 )
 
-_came: int = signal.SIGINT
+_came: int | None = None
 
 
 def _sleep_on() -> None:
@@ -43,7 +43,12 @@ wake: Callable[[], None] = _sleep_on
 
 def status() -> int:
     """The exit status for the signal that came, as shells have it: 128 and its number; without one that of Ctrl-C."""
-    return STATUS_SIGNALLED + _came
+    return STATUS_SIGNALLED + (signal.SIGINT if _came is None else _came)
+
+
+def came() -> bool:
+    """Whether one has come: whatever the main thread ends with from then on is its consequence."""
+    return _came is not None
 
 
 def watch(last_words: Callable[[], None]) -> None:
@@ -84,5 +89,7 @@ def _end_by_force(reading: int, watched: frozenset[int], last_words: Callable[[]
     _came = came
     wake()
     time.sleep(GRACE_SECONDS)
-    last_words()
-    os._exit(status())
+    try:
+        last_words()
+    finally:
+        os._exit(status())

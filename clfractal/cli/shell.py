@@ -30,6 +30,7 @@ from clfractal.files.system import read_at
 OUTPUT = "standard output"
 _CLEAR = "\r\x1b[2K"  # of a terminal: to the line's beginning, and nothing on it
 _NOISE_SHOWN = 20_000  # bytes
+_LAST_WORDS_SECONDS = 1.0  # for so long one thread waits for the other that tells of an interrupt
 
 
 class Shell:
@@ -52,6 +53,7 @@ class Shell:
                     stream.reconfigure(errors="backslashreplace")  # rather than fail at a name's letter
         self._noise: int | None = None
         self._interrupted = False
+        self._leaves = threading.Lock()
         self._kept: BinaryIO | None = None
         self.names: dict[str, str] = {}
         """What messages call a file, by its path."""
@@ -219,14 +221,22 @@ class Shell:
         return status
 
     def interrupted(self) -> None:
-        """Does what is left to do, and prints that the program was interrupted, once."""
-        if not self._interrupted:
-            self._interrupted = True
-            told = self.state()
-            for leave in self.leaving:
-                with suppress(OSError):
-                    leave()
-            self._write(told)
+        """Does what is left to do, and prints that the program was interrupted, once.
+
+        Two threads may call it, of which each ends the process afterwards: the second one waits until the first is done.
+        """
+        held = self._leaves.acquire(timeout=_LAST_WORDS_SECONDS)
+        try:
+            if held and not self._interrupted:
+                self._interrupted = True
+                told = self.state()
+                for leave in self.leaving:
+                    with suppress(OSError):
+                        leave()
+                self._write(told)
+        finally:
+            if held:
+                self._leaves.release()
 
     def noise(self) -> str:
         """What drivers wrote to standard error since `mute_drivers`."""

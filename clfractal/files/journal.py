@@ -209,9 +209,10 @@ class Journal:
 
     def close(self) -> None:
         """Closes the file and leaves it for a later `resume`."""
-        if self._descriptor >= 0:
-            os.close(self._descriptor)
-            self._descriptor = -1
+        # (Two threads may, at an interrupt.)
+        descriptor, self._descriptor = self._descriptor, -1
+        if descriptor >= 0:
+            os.close(descriptor)
 
     def discard(self) -> None:
         """Removes the file: the work is done."""
