@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -127,7 +128,20 @@ class Running:
     def wait_until(self, ready: Callable[[], bool]) -> None:
         wait_until(ready, self.process)
 
-    def ended_by(self, *signals: signal.Signals, seconds: float = 60) -> tuple[int, str]:
+    def wait_until_it_listens(self) -> None:
+        """Until it answers signals itself; an interpreter that is still starting is just ended by them."""
+        told = Path(f"/proc/{self.process.pid}/status")
+        if not told.exists():
+            time.sleep(0.5)  # such a system does not tell
+            return
+
+        def listens() -> bool:
+            caught = re.search(r"^SigCgt:\s*(\w+)", told.read_text(), re.MULTILINE)
+            return caught is not None and bool(int(caught[1], 16) >> (signal.SIGTERM - 1) & 1)
+
+        self.wait_until(listens)
+
+    def ended_by(self, *signals: signal.Signals, seconds: float = 200) -> tuple[int, str]:
         """Sends the signals; gives status and standard error."""
         for each in signals:
             self.process.send_signal(each)
