@@ -13,6 +13,7 @@ import random
 import statistics
 import threading
 import time
+from collections.abc import Callable
 
 from clfractal.cli.bench import HAST
 from clfractal.device.cancel import CancelToken
@@ -22,13 +23,15 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 
 
-def cancelled_after(engine: Engine, scene: Scene, delay: float) -> float | None:
+def cancelled_after(
+    engine: Engine, scene: Scene, delay: float, clock: Callable[[], float] = time.perf_counter
+) -> float | None:
     """Seconds from a cancel, `delay` seconds after the render began, until the device is idle; None if it was done."""
     token = CancelToken()
     asked: list[float] = []
 
     def cancel() -> None:
-        asked.append(time.perf_counter())
+        asked.append(clock())
         token.cancel()
 
     timer = threading.Timer(delay, cancel)
@@ -36,15 +39,20 @@ def cancelled_after(engine: Engine, scene: Scene, delay: float) -> float | None:
     try:
         engine.render(scene, token=token)
     except Stopped:
-        idle = time.perf_counter()
-        return idle - asked[0]
+        return clock() - asked[0]
     finally:
         timer.cancel()
         timer.join()
     return None
 
 
-def waits(engine: Engine, scene: Scene, count: int, seed: int = 1) -> list[float]:
+def waits(
+    engine: Engine,
+    scene: Scene,
+    count: int,
+    seed: int = 1,
+    clock: Callable[[], float] = time.perf_counter,
+) -> list[float]:
     """Seconds until the device was idle, for `count` cancels at random moments of a render."""
     engine.render(scene)
     start = time.perf_counter()
@@ -54,7 +62,7 @@ def waits(engine: Engine, scene: Scene, count: int, seed: int = 1) -> list[float
     found: list[float] = []
     small = scene.model_copy(update={"image": {"width": 32, "height": 32}})
     while len(found) < count:
-        wait = cancelled_after(engine, scene, source.uniform(0, 0.95 * duration))
+        wait = cancelled_after(engine, scene, source.uniform(0, 0.95 * duration), clock)
         if wait is not None:
             found.append(wait)
         if len(found) % 20 == 0:

@@ -222,7 +222,7 @@ def test_a_change_ends_a_render(tmp_path: Path) -> None:
         with watch._ended_by_change(Watched([file], interval=0.01)) as token:
             cancelled.append(token.cancelled)
             file.write_text("22")
-            for _ in range(500):
+            for _ in range(6000):
                 if token.cancelled:
                     break
                 time.sleep(0.02)

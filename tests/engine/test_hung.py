@@ -7,7 +7,7 @@ import sys
 import threading
 import time
 from collections import deque
-from collections.abc import Generator, Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,7 +16,8 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device, choose
-from clfractal.engine import sharing
+from clfractal.engine import several, sharing
+from clfractal.engine.device_workers import DeviceWorkers
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Result, WorkItem
@@ -26,8 +27,8 @@ from clfractal.files.exr import read_exr
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
-from tests.long_renders import PROMISE_SECONDS
-from tests.shell import Running
+from tests.long_renders import LIMIT_SECONDS
+from tests.shell import Running, has_bytes
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
@@ -38,6 +39,7 @@ class Hang:
 
     after: int = 10
     began: threading.Event = field(default_factory=threading.Event)
+    lasts: threading.Event = field(default_factory=threading.Event)
     freed: threading.Event = field(default_factory=threading.Event)
     ended: threading.Event = field(default_factory=threading.Event)
 
@@ -56,6 +58,7 @@ class Hanging(LocalExecutor):
                 left -= len(result.tiles)
                 if left <= 0:
                     hang.began.set()
+                    hang.lasts.set()
                     hang.freed.wait()
                 yield result
         finally:
@@ -71,7 +74,7 @@ class Waiting(LocalExecutor):
         self, job: Job, items: Iterable[WorkItem], token: clfractal.CancelToken | None = None
     ) -> Generator[Result]:
         for result in super().execute(job, items, token):
-            assert self.hang.began.wait(30)
+            assert self.hang.began.wait(200)
             yield result
 
 
@@ -93,10 +96,23 @@ def whole(device: Device) -> clfractal.Framebuffer:
         return engine.render(SCENE)
 
 
+class Lenient(DeviceWorkers):
+    """A device that hangs is given up soon, and no other: on a loaded machine it may be late."""
+
+    def __init__(self, executors: Sequence[LocalExecutor], jobs: Sequence[Job], shared: Shared) -> None:
+        super().__init__(executors, jobs, shared)
+
+        def patience(device: int) -> float:
+            executor = executors[device]
+            return 1.0 if isinstance(executor, Hanging) and executor.hang.lasts.is_set() else 1000.0
+
+        shared.patience = patience  # type: ignore[method-assign]
+
+
 @pytest.fixture
 def hang(monkeypatch: pytest.MonkeyPatch) -> Iterator[Hang]:
     """For a device that is given up soon."""
-    monkeypatch.setattr(sharing, "_SHORTEST_PATIENCE", 1.0)
+    monkeypatch.setattr(several, "DeviceWorkers", Lenient)
     found = Hang()
     yield found
     found.freed.set()
@@ -129,7 +145,7 @@ def test_a_device_that_comes_back_late_does_no_harm(
     def slow(own: LocalExecutor, *arguments: object) -> Generator[Result]:
         for result in execute(own, *arguments):  # type: ignore[arg-type]
             if own.device.info.index.endswith("#2") and hang.freed.is_set() and not late:
-                late.append(hang.ended.wait(20))
+                late.append(hang.ended.wait(200))
             yield result
 
     monkeypatch.setattr(LocalExecutor, "execute", slow)
@@ -259,9 +275,15 @@ def hanging(own, *arguments):
         yield result
 
 LocalExecutor.execute = hanging
-sharing._SHORTEST_PATIENCE = float(sys.argv.pop(1))
+# Of a device that does not hang nobody loses patience, however late it is.
+soon = float(sys.argv.pop(1))
+sharing.Shared.patience = lambda own, place: soon if place == 0 and os.path.exists("hangs") else 1000.0
 main()
 """
+
+
+# Bytes of a journal that has some: each has nine channels.
+SOME_TILES = 5 * 9 * 32 * 32 * 4
 
 
 def started(folder: Path, patience: float) -> Running:
@@ -284,6 +306,7 @@ def test_ctrl_c_while_a_device_hangs(tmp_path: Path) -> None:
     for _ in range(3):
         running = started(tmp_path, 1000.0)
         running.wait_until((tmp_path / "hangs").exists)
+        running.wait_until(has_bytes(tmp_path / "out.exr.partial", SOME_TILES))
         time.sleep(1.0)  # the other one has done all that it can
         begin = time.monotonic()
         status, told = running.ended_by(signal.SIGINT)
@@ -291,4 +314,4 @@ def test_ctrl_c_while_a_device_hangs(tmp_path: Path) -> None:
         assert status == 130, told
         assert (tmp_path / "out.exr.partial").exists()
         (tmp_path / "hangs").unlink()
-    assert min(seconds) < PROMISE_SECONDS
+    assert max(seconds) < LIMIT_SECONDS

@@ -23,6 +23,8 @@ from clfractal.viewer.session import Session
 from tests.scenes import STEREO, bulb_text
 
 SIZE = (96, 64)
+FOREVER = 10_000.0
+"""Seconds, in place of `session.SETTLE_SECONDS`: a movement lasts until a request ends it, however late tests are."""
 BULB = bulb_text(SIZE, "renderer: {samples: 4}\n")
 BALL = """
 version: 1
@@ -41,8 +43,8 @@ def scene_of(text: str = BULB, *overrides: str) -> Scene:
     return clfractal.load_scene(text, overrides=overrides)
 
 
-def wait_for(true: Callable[[], object], seconds: float = 60.0) -> None:
-    """Waits until something is true; fails if that takes too long."""
+def wait_for(true: Callable[[], object], seconds: float = 120.0) -> None:
+    """Waits until something is true; fails if that takes far too long, on any machine."""
     end = time.perf_counter() + seconds
     while not true():
         assert time.perf_counter() < end, "waited too long"
@@ -56,18 +58,26 @@ class Watch:
     session: Session
     frames: list[Frame] = field(default_factory=list)
     progress: list[str] = field(default_factory=list)
+    pauses: Callable[[Frame], bool] = lambda frame: False
+    """After which frame the session pauses, before it does anything more."""
 
     def woken(self) -> None:
         """Called from the session's thread."""
         frame = self.session.frame
         if frame is not None and (not self.frames or self.frames[-1] is not frame):
             self.frames.append(frame)
+            if self.pauses(frame):
+                self.session.pause()
         if self.session.progress:
             self.progress.append(self.session.progress)
 
-    def rest(self, seconds: float = 60.0) -> Frame:
+    def shows(self, true: Callable[[Frame], object]) -> None:
+        """Waits until a frame has come of which something is true, whatever came after it."""
+        wait_for(lambda: any(true(each) for each in list(self.frames)))
+
+    def rest(self) -> Frame:
         """The frame when nothing is under way any more."""
-        wait_for(lambda: self.session.idle, seconds)
+        wait_for(lambda: self.session.idle)
         assert self.session.frame is not None, self.session.problem
         return self.session.frame
 

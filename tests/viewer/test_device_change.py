@@ -14,6 +14,7 @@ from clfractal.viewer import studio as studio_module
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.studio import Studio
 from tests.shell import SCENE
+from tests.viewer.sessions import wait_for
 
 
 class Slow:
@@ -38,7 +39,7 @@ class Slow:
         found, self.tasks = self.tasks, []
         return found
 
-    def close(self, timeout: float | None = 10.0) -> bool:
+    def close(self, timeout: float | None = 200.0) -> bool:
         return self.let_go.wait(timeout)
 
 
@@ -54,15 +55,12 @@ def test_the_window_does_not_wait_for_the_old_device(studio: Studio) -> None:
     old.tasks = ["thumbnail", "still"]
     start = time.monotonic()
     studio.use_device("new")  # type: ignore[arg-type]
-    assert time.monotonic() - start < 1
+    assert time.monotonic() - start < 60  # it would wait for ever
     new: Any = studio.session
     assert new.device == "new"
     assert new.tasks == []
     old.let_go.set()
-    deadline = time.monotonic() + 5
-    while new.tasks != ["thumbnail", "still"]:
-        assert time.monotonic() < deadline
-        time.sleep(0.01)
+    wait_for(lambda: new.tasks == ["thumbnail", "still"])
     new.let_go.set()
     studio.close()
 

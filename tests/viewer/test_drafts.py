@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from contextlib import nullcontext
 
 import numpy as np
@@ -17,12 +16,14 @@ from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
 from clfractal.scene.light_paths import DirectLighting
 from clfractal.scene.parts import PerspectiveCamera
+from clfractal.viewer import session
 from clfractal.viewer.drafts import draft
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.panels import overlay
 from tests.viewer.panel_harness import make_ui
 from tests.viewer.sessions import (
     BULB,
+    FOREVER,
     equal_pictures,
     framebuffers_of,
     scene_of,
@@ -70,17 +71,22 @@ def test_other_scenes_have_none() -> None:
 
 
 @pytest.mark.parametrize("options", [PATHS, SKY])
-def test_it_is_a_draft_while_it_moves_alone(options: tuple[str, ...], device: Device) -> None:
+def test_it_is_a_draft_while_it_moves_alone(
+    options: tuple[str, ...], device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     scene = scene_of(BULB, *options)
     with session_on(device) as watch:
         watch.finished(scene)
         watch.frames.clear()
+        monkeypatch.setattr(session, "SETTLE_SECONDS", FOREVER)
         for step in range(1, 6):
             number = watch.session.request(turned(scene, 0.1 * step), moving=True)
             wait_for(lambda: watch.frames and watch.frames[-1].request == number)  # noqa: B023
         assert all(each.is_draft for each in watch.frames)
         red, green = (planes_of(watch.frames[-1].canvas.read(device.transfers, 0), name) for name in "RG")
         assert red > 2 * green, "it has its colour"
+        monkeypatch.undo()
+        number = watch.session.request(turned(scene, 0.5), follows=True)
         frame = watch.rest()
         assert (frame.request, frame.finished, frame.is_draft) == (number, True, False)
         equal_pictures(framebuffers_of(frame).picture(), shell(turned(scene, 0.5)))
@@ -106,13 +112,11 @@ def test_the_first_move_compiles_nothing(device: Device, slow: Slow) -> None:
     with session_on(device) as watch:
         watch.finished(scene)
         begun = slow.begun
-        slow.seconds = 20.0
-        start = time.perf_counter()
+        slow.seconds = 10_000.0
         for step in range(1, 4):
             watch.session.request(turned(scene, 0.1 * step), moving=True)
             frame = watch.rest()
             assert not frame.is_draft
-        assert time.perf_counter() - start < 20
         assert slow.begun == begun
         assert any(each.is_draft for each in watch.frames)
 

@@ -19,7 +19,7 @@ from clfractal.viewer.picking import picked
 from clfractal.viewer.pointer import project
 from clfractal.viewer.viewport import image_of, render_key
 from tests.render.shots import BALL_RADIUS
-from tests.viewer.sessions import BALL, scene_of, session_on, shown_frame, wait_for
+from tests.viewer.sessions import BALL, scene_of, session_on, shown_frame
 
 WINDOW = (128, 96)
 MODES = (None, *get_args(Mode))
@@ -103,9 +103,9 @@ def test_nothing_is_hit_beside_the_ball_and_nothing_outside(device: Device) -> N
 
 def test_coarse_pictures_are_picked_too(device: Device) -> None:
     with session_on(device, Pacing(seconds_per_pixel=1e-4)) as watch:
+        watch.pauses = lambda frame: True
         watch.session.request(in_window(None, "camera.fov=40"), moving=True)
-        wait_for(lambda: watch.frames)
-        watch.session.pause()
+        watch.shows(lambda frame: True)
         frame = watch.rest()
         assert frame.divider > 1
         shown, _ = shown_frame(device, watch, frame, Look())

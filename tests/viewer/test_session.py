@@ -27,6 +27,7 @@ from clfractal.viewer.session import Session
 from tests.viewer.sessions import (
     BALL,
     BULB,
+    FOREVER,
     SCENES,
     Watch,
     equal_pictures,
@@ -38,6 +39,9 @@ from tests.viewer.sessions import (
     turned,
     wait_for,
 )
+
+SOON = 10.0
+"""Seconds within which what takes milliseconds on an idle machine is done on a loaded one; to finish would take minutes."""
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -73,20 +77,24 @@ def test_frames_become_finer(device: Device) -> None:
     assert [frame.finished for frame in frames].index(True) == len(frames) - 1
 
 
-def test_while_something_moves_frames_come_whatever_the_rate_of_requests(device: Device) -> None:
+def test_while_something_moves_frames_come_whatever_the_rate_of_requests(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     """Requests that come faster than frames can be made must not end each other's frame."""
     scene = scene_of(BULB, "image.width=960", "image.height=640")
     with session_on(device, Pacing(coarsest=1)) as watch:
         watch.finished(scene_of())  # the program is there
         watch.frames.clear()
+        monkeypatch.setattr(sessions_module, "SETTLE_SECONDS", FOREVER)
         start, number = time.perf_counter(), 0
         # However slow the machine is: three requests are shown while later ones come in every millisecond.
-        while len({each.request for each in watch.frames}) < 3 and time.perf_counter() - start < 60:
+        while len({each.request for each in list(watch.frames)}) < 3 and time.perf_counter() - start < 120:
             number += 1
             watch.session.request(turned(scene, 0.0001 * number), moving=True)
             time.sleep(0.001)
         moving = list(watch.frames)
-        last = watch.session.newest
+        monkeypatch.undo()
+        last = watch.session.request(turned(scene, 0.0001 * number), follows=True)
         frame = watch.rest()
         assert len({each.request for each in moving}) >= 3
         assert all(each.samples == 1 for each in moving)
@@ -105,7 +113,7 @@ def test_a_request_ends_what_is_under_way(device: Device) -> None:
             start = time.perf_counter()
             number = watch.session.request(scene_of(), moving=moving)
             wait_for(lambda: watch.frames[-1].request == number)  # noqa: B023
-            assert time.perf_counter() - start < 2
+            assert time.perf_counter() - start < SOON
         frame = watch.rest()
         equal_pictures(framebuffers_of(frame).picture(), shell(scene_of()))
 
@@ -210,13 +218,13 @@ def test_samples_that_were_lost_are_made_again(name: str, device: Device) -> Non
     """What passes keep goes with a drawing that is stopped while it takes a view: then they begin anew."""
     scene = scene_of(BULB, *SCENES[name], "renderer.samples=256")
     with session_on(device) as watch:
+        watch.pauses = lambda frame: frame.divider == 1
         watch.session.request(scene)
-        wait_for(lambda: watch.frames and watch.frames[-1].divider == 1)
-        watch.session.pause()
+        watch.shows(lambda frame: frame.divider == 1)
         frame = watch.rest()
-        if not frame.finished:
-            watch.session._executor._drawings.clear()
+        watch.session._executor._drawings.clear()
         assert not frame.finished
+        watch.pauses = lambda frame: False
         watch.session.pause(False)
         equal_pictures(framebuffers_of(watch.rest()).picture(), shell(scene))
 
@@ -320,7 +328,7 @@ def test_it_closes_quickly_at_any_moment(device: Device) -> None:
         time.sleep(wait)
         start = time.perf_counter()
         assert session.close()
-        assert time.perf_counter() - start < 2
+        assert time.perf_counter() - start < SOON
     assert not any(thread.name == "clfractal-session" for thread in threading.enumerate())
 
 

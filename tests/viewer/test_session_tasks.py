@@ -89,13 +89,13 @@ def test_a_still_is_cancelled_soon_and_writes_nothing(device: Device, tmp_path: 
         time.sleep(0.5)
         # A picture that is asked for meanwhile is made first.
         frame_number = watch.session.request(turned(scene_of(), 0.3))
-        wait_for(lambda: watch.session.frame.request == frame_number and watch.session.frame.samples == 1)  # type: ignore[union-attr]
+        watch.shows(lambda frame: frame.request == frame_number and frame.samples >= 1)
         assert not still.finished
         time.sleep(0.3)
         start = time.perf_counter()
         still.cancel()
         watch.rest()
-        assert time.perf_counter() - start < 2
+        assert time.perf_counter() - start < 20  # to finish it would take minutes
         assert (still.finished, still.cancelled, still.problem) == (True, True, "")
     assert not list(tmp_path.iterdir())
 
