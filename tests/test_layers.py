@@ -111,6 +111,22 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
     assert loaded & (own | foreign) == set()
 
 
+def test_a_render_with_known_programs_starts_no_process(tmp_path: Path) -> None:
+    """A compiler in a process of its own takes longer to start than all else; nor is one asked within this process."""
+    scene = tmp_path / "scene.yaml"
+    scene.write_text("version: 1\nformula: {name: hast}\ncamera: {}\n", encoding="utf-8")
+    order = ["render", str(scene), "--size", "16x16", "-o", str(tmp_path / "picture.png")]
+    code = (
+        "import sys; from clfractal.cli import run; from clfractal.cli.shell import Shell\n"
+        "starts = ('subprocess.', 'os.fork', 'os.posix_spawn', 'os.exec', 'os.spawn', 'os.system')\n"
+        "sys.addaudithook(lambda event, _: print(event) if event.startswith(starts) else None)\n"
+        f"assert run({order!r}, Shell(owns_process=False)) == 0\n"
+        "print(sys.modules['clfractal.device.children'].__name__)"
+    )
+    works(python(code))  # what is compiled and measured once
+    assert works(python(code)).out.split() == ["clfractal.device.children"]
+
+
 def test_the_program_starts_without_what_it_does_not_need(monkeypatch: pytest.MonkeyPatch) -> None:
     """The user's own settings of the libraries stay."""
     code = (
