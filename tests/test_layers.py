@@ -111,6 +111,19 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
     assert loaded & (own | foreign) == set()
 
 
+def test_only_sections_that_a_scene_has_get_validators() -> None:
+    """Making those of all takes longer than all else about reading a scene."""
+    code = (
+        "from clfractal.scene.load import load_scene\n"
+        "from clfractal.scene.animation import Animation; from clfractal.scene.volume import VolumeRenderer\n"
+        "from clfractal.scene.lighting import Fog; from clfractal.scene.surface import SurfaceRenderer\n"
+        "load_scene({'version': 1, 'formula': {'name': 'hast'}, 'camera': {}, 'fog': {}})\n"
+        "sections = (Animation, VolumeRenderer, Fog, SurfaceRenderer)\n"
+        "print(*(section.__pydantic_complete__ for section in sections))"
+    )
+    assert works(python(code)).out.split() == ["False", "False", "True", "True"]
+
+
 def test_a_render_with_known_programs_starts_no_process(tmp_path: Path) -> None:
     """A compiler in a process of its own takes longer to start than all else; nor is one asked within this process."""
     scene = tmp_path / "scene.yaml"

@@ -130,7 +130,9 @@ def dump_scene(scene: Scene, *, only_ascii: bool = False) -> str:
 
 def schema() -> dict[str, Any]:
     """The JSON Schema of a scene file, for editors."""
-    found = Scene.model_json_schema()
+    from clfractal.schema.json_schema import JsonSchema
+
+    found = Scene.model_json_schema(schema_generator=JsonSchema)
     plain = _defaults()
     for key, entry in found["properties"].items():
         if key not in found["required"]:

@@ -7,6 +7,7 @@ keep the import of the schema short.
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from math import cos, fmod, radians, sin
+from threading import RLock
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, TypeAlias, TypeVar
 
 from pydantic import (
@@ -17,15 +18,20 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     ValidationError,
+    ValidationInfo,
     model_validator,
 )
 from pydantic_core import CoreSchema, PydanticCustomError
+from pydantic_core.core_schema import plain_serializer_function_ser_schema, with_info_plain_validator_function
 
 from clfractal.errors import SceneError, Where
 from clfractal.errors.arguments import plain
 from clfractal.schema.fields import DIRECTION, PLACE
 from clfractal.schema.hex_color import AS_TEXT
 
+PART = "section"
+"""In the metadata of a pydantic schema: the section that it stands for, whose own is made later."""
+_MAKING = RLock()  # older versions of pydantic have none
 S = TypeVar("S", bound="Section")
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -101,6 +107,24 @@ class Section(BaseModel, metaclass=_Kind):
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False, defer_build=True)
     tag: ClassVar[str] = ""
+
+    @classmethod
+    def __get_pydantic_core_schema__(cls, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        """As pydantic's; within another section, its validator is made when the first value comes.
+
+        Making all of them takes longer than anything else about loading a scene, which has few.
+        """
+        if handler.field_name is None:
+            return handler(source)
+        return with_info_plain_validator_function(cls._as_part, metadata={PART: cls})
+
+    @classmethod
+    def _as_part(cls, value: Any, info: ValidationInfo) -> Any:
+        if not cls.__pydantic_complete__:
+            with _MAKING:
+                cls.model_rebuild()
+        # Where this refuses, pydantic puts the path of this place before the section's own.
+        return cls.__pydantic_validator__.validate_python(value, context=info.context)
 
     def __dir__(self) -> list[str]:
         """The keys, and what else is meant for users: not what pydantic's models bring along."""
@@ -183,7 +207,9 @@ class ChosenBy:
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """As pydantic's unions of which a function chooses."""
-        return Discriminator(self._choose).__get_pydantic_core_schema__(source, handler)
+        found = Discriminator(self._choose).__get_pydantic_core_schema__(source, handler)
+        # Written as what it is: pydantic cannot look into sections made later to choose between them.
+        return {**found, "serialization": plain_serializer_function_ser_schema(lambda section: section)}
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         """One of the sections. All but the default need their word: else a mapping without it would be all of them."""
