@@ -35,6 +35,9 @@ _SHARES = 32
 # pixels for each of its units make both short. (Of an H200's 132 units a quarter as many take 1.5 to 1.9 times as long, and
 # a sixteenth 3.6 to 5.3 times.)
 _PIXELS_OF_UNIT = 8192
+# On a processor a launch costs as much as what a kernel does for some hundreds of pixels, and a sample along paths is
+# dozens of stages: so many pixels for each hide that, and what they keep between stages is still in the caches.
+_PIXELS_OF_STAGE = 16_384
 # Device memory for passes that the user is told of before it is taken.
 _WORTH_TELLING = 1 << 28
 
@@ -170,7 +173,8 @@ class LocalExecutor:
             drawing.keep(int(places.max()) + 1)
         outlet = partial_of(self.outlet, item.view) if self.outlet is not None else None
         # Of what devices share each takes only what its launches under way hold.
-        group = pixels_at_a_time(self.device) // TILE_PIXELS if self.supply is None else 0
+        staged = bool(drawing.wave.sizes)
+        group = pixels_at_a_time(self.device, staged=staged) // TILE_PIXELS if self.supply is None else 0
         cutter = _Cutter(drawing, item, take, places, group)
         pace = drawing.pace
         pace.seconds = self.budget_seconds / IN_FLIGHT
@@ -210,9 +214,15 @@ class LocalExecutor:
         return drawing
 
 
-def pixels_at_a_time(device: Device) -> int:
-    """How many pixels a launch should have at least, even if it can have only one sample of each; 0: it does not matter."""
-    return _PIXELS_OF_UNIT * device.info.compute_units if device.info.kind == "gpu" else 0
+def pixels_at_a_time(device: Device, *, staged: bool) -> int:
+    """How many pixels a launch should have at least, even if it can have only one sample of each; 0: it does not matter.
+
+    Args:
+        staged: whether its samples go from stage to stage, so that each is several kernels.
+    """
+    if device.info.kind == "gpu":
+        return _PIXELS_OF_UNIT * device.info.compute_units
+    return _PIXELS_OF_STAGE if staged else 0
 
 
 def _all_places(view: PlannedView) -> Tiles:

@@ -182,7 +182,7 @@ def test_groups_of_tiles_in_parts(
     device: Device, wholes: dict[str, npt.NDArray[np.float32]], monkeypatch: pytest.MonkeyPatch, name: str
 ) -> None:
     """As on GPUs: launches of several tiles with some samples of each, which together are rendered as alone."""
-    monkeypatch.setattr(local, "pixels_at_a_time", lambda device: 5 * TILE * TILE)
+    monkeypatch.setattr(local, "pixels_at_a_time", lambda device, staged: 5 * TILE * TILE)
     spans: list[tuple[int, tuple[int, int]]] = []
     start = drawing.Drawing.start
 
