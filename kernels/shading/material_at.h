@@ -89,7 +89,8 @@ INLINE void pbr_of_face(const interaction *here, pbr *p) {
 // What a path meets at an interaction: a thing's material, where two solids flow together a blend of theirs, or the face of a cut.
 INLINE pbr pbr_found(stage s, const interaction *here, world w) {
     pbr p = pbr_at(s, here, w);
-    if (any_lane(less(R(0.0), here->share))) {
+    const mask flows = less(R(0.0), here->share);
+    if (any_lane(flows)) {
         interaction one = *here, other = one;
         const real quantity = is_colored_at_once(w.material) ? here->smooth : here->quantity;
         other.object = here->other;
@@ -99,7 +100,8 @@ INLINE pbr pbr_found(stage s, const interaction *here, world w) {
         pbr_mix mix = {0};
         pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
         pbr_add(&mix, pbr_at(s, &other, w), here->share, w);
-        p = pbr_mixed(mix, w);
+        // (A blend of one material alone is not that material to the last bit.)
+        p = pbr_pick(flows, pbr_mixed(mix, w), p);
     }
     if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;
