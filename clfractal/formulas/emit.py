@@ -19,6 +19,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeGuard
 
 from clfractal.formulas.evaluate import call_float, evaluate_constant
+from clfractal.formulas.fuse import fused
 from clfractal.formulas.nodes import COMPARISONS, Call, Name, Node, Number, names_in, substitute
 from clfractal.formulas.products import Value, literal, power_over_root, whole_complex_power, whole_power
 
@@ -75,7 +76,7 @@ class Emitter:
         prefix: begins the names of this emitter's variables.
         lets: further names and their expressions, written where they are first used.
         lines: the statements so far.
-        origins: of each variable over `real` the function and its operands (of `where` the mask's text first).
+        origins: of each variable the function and its operands (of `where` the mask's text first).
     """
 
     number_type: NumberType
@@ -166,7 +167,7 @@ class Emitter:
             self._known[key] = Value(name, kind)
         return self._known[key]
 
-    def _plain(self, value: Value) -> str:
+    def plain(self, value: Value) -> str:
         """The value without its partials."""
         return f"{value.text}.v" if value.kind == "varying" and self.number_type == "dual" else value.text
 
@@ -192,9 +193,19 @@ class Emitter:
             # The host divides once; the kernel multiplies.
             inverse = self._constant(Call("div", (Number(1.0), b.node or Number(1.0))))
             return self.combine("mul", a, inverse)
-        result = self._call(function, operands)
+        result = self._fused(function, operands) or self._call(function, operands)
         self.origins.setdefault(result.text, (function, operands))
         return result
+
+    def _fused(self, function: str, operands: tuple[Value, ...]) -> Value | None:
+        call = fused(function, operands, self.origins, self.plain)
+        if call is None:
+            return None
+        varying = any(operand.kind == "varying" for operand in operands)
+        if self.number_type == "dual" and varying:
+            value = f"{call[0]}({', '.join(call[1:])})"
+            return self._statement("dual", "varying", "dual_with", self._call(function, operands).text, value)
+        return self._statement("real", "varying" if varying else "flat", *call)
 
     def _call(self, function: str, operands: tuple[Value, ...]) -> Value:
         """The statement of one operation over the number type."""
@@ -203,9 +214,12 @@ class Emitter:
         varying = any(operand.kind == "varying" for operand in operands)
         if self.number_type == "real" or not varying:
             kind: Literal["flat", "varying"] = "varying" if self.number_type == "real" and varying else "flat"
+            if function == "clamp" and all(bound.kind == "constant" for bound in operands[1:]):
+                # Constants are numbers, where they are used at all.
+                function = "bounded"
             return self._statement("real", kind, f"real_{function}", *(o.text for o in operands))
         if function in ("sign", "floor"):
-            return self._statement("real", "flat", f"real_{function}", self._plain(a))
+            return self._statement("real", "flat", f"real_{function}", self.plain(a))
         if b is None:
             return self._statement("dual", "varying", f"dual_{function}", a.text)
         if function == "mul" and a.text == b.text:
@@ -240,8 +254,8 @@ class Emitter:
         n = exponent.number
         if n is not None and n == math.floor(n) and abs(n) <= _WHOLE:
             if n < 0:
-                return self.combine("div", literal(1.0), whole_power(self.combine, base, int(-n)))
-            return whole_power(self.combine, base, int(n)) if n > 0 else literal(1.0)
+                return self.combine("div", literal(1.0), self._whole_power(base, int(-n)))
+            return self._whole_power(base, int(n)) if n > 0 else literal(1.0)
         if n is not None and n + 0.5 == math.floor(n + 0.5) and 0 < n <= _WHOLE:
             # A half more than a whole power is that power times the square root.
             root = self.combine("sqrt", base)
@@ -253,6 +267,12 @@ class Emitter:
         if self.number_type == "dual" and "varying" in (base.kind, exponent.kind):
             return self._statement("dual", "varying", "dual_pow", self._lift(base), self._lift(exponent))
         return self.combine("pow", base, exponent)
+
+    def _whole_power(self, base: Value, n: int) -> Value:
+        """base ** n; of a root by its square, so that less waits for the root."""
+        square = self._square_of_root(base) if n > 1 else None
+        power = whole_power(self.combine, square or base, n // 2 if square else n)
+        return self.combine("mul", power, base) if square and n % 2 else power
 
     def _raised(self, base: Value, exponent: Value) -> Value:
         """base ** exponent where the exponent is data; see `kernels/formulas/numbers/powers.h`."""
@@ -468,9 +488,9 @@ class Emitter:
         radicand = self.radicand(a)
         if radicand is not None and b.number == 0 and node.function in ("gt", "eq", "ne"):
             # The root need not be waited for. It is 0 for x < 0 too: sqrt(x) > 0 and sqrt(x) != 0 where x > 0.
-            text = f"less({self._plain(b)}, {self._plain(radicand)})"
+            text = f"less({self.plain(b)}, {self.plain(radicand)})"
             return f"(~{text})" if node.function == "eq" else text
-        left, right = self._plain(a), self._plain(b)
+        left, right = self.plain(a), self.plain(b)
         if node.function in ("gt", "ge"):
             left, right = right, left
         call = {"lt": "less", "gt": "less", "le": "less_equal", "ge": "less_equal"}.get(

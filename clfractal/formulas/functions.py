@@ -16,6 +16,8 @@ class Facts:
         has_derivative: every link carries a scalar rule, so marching needs no Jacobian.
         has_shape: the last solid is told by a shape.
         has_calls: of exp, sin and their like.
+        carries_orbits: whether a march leaves a packet's last orbits under way: where an application costs much beside a
+            step, and is the same however many have been.
     """
 
     size: int
@@ -24,6 +26,7 @@ class Facts:
     has_derivative: bool
     has_shape: bool
     has_calls: bool
+    carries_orbits: bool
 
     def defines(self, **others: object) -> str:
         """As defines, of which some have other values."""
@@ -35,6 +38,7 @@ class Facts:
             "HAS_DERIVATIVE": int(self.has_derivative),
             "HAS_SHAPE": int(self.has_shape),
             "HAS_CALLS": int(self.has_calls),
+            "CARRIES_ORBITS": int(self.carries_orbits),
         }
         return "".join(f"#define {name} {value}\n" for name, value in {**values, **others}.items())
 

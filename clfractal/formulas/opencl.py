@@ -11,13 +11,14 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, Literal
 
-from clfractal.formulas.costs import cost_of
+from clfractal.formulas.costs import OPERATIONS, WORTH_CARRYING, cost_of, count_of_operations
 from clfractal.formulas.emit import Constants, Emitter, NumberType
 from clfractal.formulas.evaluate import as_function, evaluate_constant, finite
 from clfractal.formulas.functions import Facts, each_usual, state_functions
+from clfractal.formulas.fuse import fused, without_unused
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.products import Value, literal
@@ -153,8 +154,7 @@ def operations_per_application(chain: Chain) -> float:
         link = chain.links[index]
         name = _name(prefix, index, usual and bool(link.bound.formula.shaping))
         body = formula.text.partition(f" {name}(")[2].partition("\n}")[0]
-        calls = re.findall(r"\b((?:real|dual)_\w+)\(", body)
-        total += link.count * link.bound.repeat * sum(_OPERATIONS.get(call, 1) for call in calls)
+        total += link.count * link.bound.repeat * count_of_operations(body, OPERATIONS)
     return total / chain.cycle_length
 
 
@@ -191,6 +191,7 @@ class _ChainWriter:
             self.has_derivative,
             self.chain.shape_index is not None,
             any(map(_CALLS.search, parts)),
+            len(self.links) == 1 and self._operations() >= WORTH_CARRYING,
         )
         head = [facts.defines() + each_usual(1), state_functions(self.width)] if self.leaf is None else []
         return _Written(
@@ -201,6 +202,12 @@ class _ChainWriter:
                 for slot, (owner, node) in enumerate(self.constants.owners)
             ),
         )
+
+    def _operations(self) -> int:
+        """Of an application as rays march by it, of the first link."""
+        usual = self.shaped(0)
+        marched = self._apply_derivative if self.has_derivative else partial(self._apply, number_type="dual")
+        return count_of_operations(marched(0, usual=usual), OPERATIONS)
 
     def _of_type(self, number_type: NumberType) -> list[str]:
         """The functions over one number type."""
@@ -262,24 +269,35 @@ class _ChainWriter:
         )
 
     def _add_constant(
-        self, index: int, number_type: NumberType, emitter: Emitter, mapped: list[Value]
+        self,
+        index: int,
+        number_type: NumberType,
+        emitter: Emitter,
+        mapped: list[Value],
+        local: tuple[Emitter, list[Value]] | None = None,
     ) -> list[str]:
-        """The components after adding C."""
+        """The components after adding C; `local`: a map written by its Jacobian, of which they are the values."""
         bound = self.links[index].bound
-        texts = []
+        texts: list[str] = []
+        writer, values = local or (emitter, mapped)
         for i, value in enumerate(mapped):
+            added = Value(f"c.s{i}{'.v' if local else ''}", "varying")
             if bound.add == "none":
                 texts.append(self._full(number_type, value))
             elif bound.add == "constant":
                 assert bound.julia is not None
-                slot = self.constants.text((index, "julia", i))
-                added = emitter.combine("add", value, Value(slot, "flat"))
-                texts.append(self._full(number_type, added))
+                added = Value(self.constants.text((index, "julia", i)), "flat")
+                texts.append(self._full(number_type, emitter.combine("add", value, added)))
             elif number_type == "dual" and i < 3:
                 # The point's own coordinate has the partials 1, 0, 0: one addition instead of four.
                 texts.append(f"dual_add_coordinate_{'xyz'[i]}({self._full('dual', value)}, c.s{i}.v)")
             else:
                 texts.append(f"{number_type}_add({self._full(number_type, value)}, c.s{i})")
+            # The product of a last operation joins what is added, as it does within the map.
+            call = fused("add", (values[i], added), writer.origins, writer.plain)
+            if call is not None and bound.add != "none" and (local or bound.add != "constant"):
+                text = f"{call[0]}({', '.join(call[1:])})"
+                texts[i] = text if number_type == "real" else f"dual_with({texts[i]}, {text})"
         return texts
 
     def _apply(self, index: int, number_type: NumberType, *, usual: bool) -> str:
@@ -287,11 +305,13 @@ class _ChainWriter:
         state = "state" if number_type == "real" else "dual_state"
         emitter = self._emitter(index, number_type, branches=number_type == "real", usual=usual)
         mapped = self._map(emitter, bound)
+        local = None
         if number_type == "dual" and not bound.formula.point_map and self.dual_map != "operations":
-            local, rows = self._by_local_jacobian(index, usual=usual)
-            cost = cost_of([*local.lines, *(f" = {row};" for row in rows)])
-            if self.dual_map == "jacobian" or cost < cost_of(emitter.lines):
-                emitter, mapped = local, [Value(row, "varying") for row in rows]
+            writer, values, rows = self._by_local_jacobian(index, usual=usual)
+            cost = cost_of(_needed(writer.lines, [f" = {row};" for row in rows]))
+            usually = cost_of(_needed(emitter.lines, [value.text for value in mapped]))
+            if self.dual_map == "jacobian" or cost < usually:
+                local, emitter, mapped = (writer, values), writer, [Value(row, "varying") for row in rows]
         name = self.name + _name(number_type, index, usual)
         head = f"INLINE {state} {name}({state} z, {state} c, __constant const scalar *k) {{"
         # All passes but the last one, whose map is written once more: what is added joins its last operations.
@@ -310,7 +330,7 @@ class _ChainWriter:
         adder = emitter
         if emitter.number_type != number_type:
             adder = Emitter(number_type, {}, self.constants, index, prefix="u")
-        texts = self._add_constant(index, number_type, adder, mapped)
+        texts = self._add_constant(index, number_type, adder, mapped, local)
         lines = passes + (emitter.lines if adder is emitter else [*emitter.lines, *adder.lines])
         return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
 
@@ -322,8 +342,8 @@ class _ChainWriter:
             return str(round(evaluate_constant(formula.repeat, formula.shaping)))
         return f"(int)k[{self.constants.slot((index, 'repeat', 0))}]"
 
-    def _by_local_jacobian(self, index: int, *, usual: bool) -> tuple[Emitter, list[str]]:
-        """The map over dual numbers by its own Jacobian: real statements, and a dual expression for each component."""
+    def _by_local_jacobian(self, index: int, *, usual: bool) -> tuple[Emitter, list[Value], list[str]]:
+        """The map over dual numbers by its own Jacobian: real statements, their values, and a dual expression of each."""
         emitter = self._emitter(index, "real", usual=usual)
         emitter.bindings = {
             name: Value(f"{value.text}.v", value.kind) if value.text.startswith(("z.", "c.")) else value
@@ -343,7 +363,7 @@ class _ChainWriter:
             rows.append(
                 f"{chain}({', '.join([value.text, *terms])})" if terms else f"dual_constant({value.text})"
             )
-        return emitter, rows
+        return emitter, mapped, rows
 
     def _apply_derivative(self, index: int, *, usual: bool) -> str:
         """One application that carries the scalar derivative along, sharing what the two have in common."""
@@ -441,16 +461,6 @@ class _ChainWriter:
 # What drivers have in a library: calls that move all registers into memory.
 _CALLS = re.compile(r"\breal_(exp|log|pow|power_\w+|sin|cos|tan|asin|acos|atan2?|arc_slope)\(")
 
-# Arithmetic of the dual operations that are more than one; what only selects is none.
-_OPERATIONS = {
-    "real_where": 0, "real_sign": 0, "real_abs": 0, "real_min": 0, "real_max": 0, "real_clamp": 0, "dual_where": 0,
-    "dual_constant": 0, "dual_min": 0, "dual_max": 0, "dual_clamp": 0, "dual_abs": 3,
-    "dual_add": 4, "dual_sub": 4, "dual_neg": 4, "dual_mul": 10, "dual_square": 5, "dual_mul_real": 4,
-    "dual_add_coordinate_x": 2, "dual_add_coordinate_y": 2, "dual_add_coordinate_z": 2,
-    "dual_chain": 3, "dual_chain2": 9, "dual_chain3": 15, "dual_chain4": 21, "dual_div": 12, "real_div_dual": 5,
-    "dual_sqrt": 5, "dual_rsqrt": 6,
-}  # fmt: skip
-
 
 def _name(prefix: str, index: int, usual: bool) -> str:
     return f"{prefix}_{'usual' if usual else 'apply'}_{index}"
@@ -474,6 +484,11 @@ def _turn(spans: Sequence[Span]) -> list[str]:
     return [*lines, "}"]
 
 
+def _needed(lines: Sequence[str], results: Sequence[str]) -> list[str]:
+    """Statements, and what they are for, without those that nothing uses."""
+    return without_unused("".join(f"{line}\n" for line in [*lines, *results])).splitlines()
+
+
 def _function(head: str, lines: Sequence[str], tail: str | None) -> str:
-    body = "".join(f"    {line}\n" for line in lines)
-    return f"{head}\n{body}" + (f"    {tail}\n" if tail else "") + "}\n"
+    body = "".join(f"    {line}\n" for line in lines) + (f"    {tail}\n" if tail else "")
+    return f"{head}\n{without_unused(body)}}}\n"

@@ -91,8 +91,8 @@ def _facts(each: list[Facts]) -> str:
         for name in ("first_count", "logarithmic", "has_shape")
         if len({getattr(facts, name) for facts in each}) > 1
     }
-    # (Orbits of several solids do not run side by side, so the last one is of no account.)
-    return each[0].defines(JOINED=1, HAS_CALLS=1, **differing)
+    # (Orbits of several solids run neither side by side nor are they left under way: the last two are of no account.)
+    return each[0].defines(JOINED=1, HAS_CALLS=1, CARRIES_ORBITS=0, **differing)
 
 
 def _usual(leaves: int) -> str:

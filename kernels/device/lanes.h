@@ -92,9 +92,17 @@ INLINE real direct_pick(mask m, real yes, real no) {
 #define as_whole(a) JOIN(as_, OF_LANES(INTEGER))(a)
 #define as_real(a) JOIN(as_, OF_LANES(SCALAR))(a)
 
-// The smaller and the larger one, where neither is NaN: as one instruction, which fmin and fmax are not.
-#define least(a, b) pick(less(a, b), a, b)
-#define most(a, b) pick(less(a, b), b, a)
+// The smaller and the larger one of two, as one instruction of a processor, which fmin and fmax are not, since these look for NaN.
+// Of a NaN here packets' `least` gives the second one and `most` the first: where the other one may be NaN, a number stands there.
+#if LANES == 1
+INLINE real least(real a, real b) { return fmin(a, b); }
+INLINE real most(real a, real b) { return fmax(a, b); }
+#else
+INLINE real least(real a, real b) { return pick(less(a, b), a, b); }
+INLINE real most(real a, real b) { return pick(less(a, b), b, a); }
+#endif
+// `a`, but at least `low` and then at most `high`.
+INLINE real bounded(real a, real low, real high) { return least(most(low, a), high); }
 
 // The processor's own estimate of 1/sqrt(a), where the compiler generates x86 code directly and names the instruction.
 #if !REAL_IS_DOUBLE && defined(__has_builtin) && !defined(INTERPRETED)

@@ -41,7 +41,7 @@ INLINE void vec_store(vec v, scalar a[3][LANES]) {
 // Length 1; a vector that is zero or not finite becomes zero. Scaled by the largest component first, so that squares neither
 // overflow nor vanish.
 INLINE vec vec_normalize(vec a) {
-    const real largest = fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z));
+    const real largest = most(most(fabs(a.x), fabs(a.y)), fabs(a.z));
     const vec b = vec_scale(a, R(1.0) / largest);
     const real square = vec_dot(b, b);  // 1 to 3, if a is usable
     const mask usable = less(R(0.0), square) & less_equal(square, R(4.0));

@@ -13,7 +13,7 @@ typedef struct {
 } escaped;
 
 // The escape of points within `most` applications. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
-// of the distances of orbit.h; else they are whole, those of `formula_escape_count`.
+// of the distances (packet_orbits.h); else they are whole, those of `formula_escape_count`.
 //
 // A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent

@@ -1,4 +1,4 @@
-// Orbits of points under the formula, as one loop over a packet: escape counts, inside tests, distances and gradients.
+// Orbits of points under the formula, as one loop over a packet: escape counts and inside tests; and what the end of any orbit says.
 //
 // From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
 // LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, dual_start, apply,
@@ -31,24 +31,11 @@ INLINE real distance_from_growth(real square, real relative, real count, orbit_r
         distance = (R(1.0) - (real)(orbit->solid_radius) / sqrt(square)) * relative;
     }
     // An overflow of the derivative means that the surface is nearer than the number type can resolve.
-    return fmax(pick(is_nan(distance), R(0.0), distance), R(0.0));
+    return most(R(0.0), pick(is_nan(distance), R(0.0), distance));
 }
 
 // Lanes that end the orbit inside at the iteration limit: true for those still within the bailout.
 INLINE mask in_set(real square, orbit_record orbit) { return less_equal(square, (real)(orbit->bailout_square)); }
-
-// What an orbit for a distance looks at after `look` applications: at the limit, which of its lanes are inside; before it, whether
-// the work was cancelled, which is the result.
-INLINE int orbit_look(int n, int *look, real square, mask *alive, mask *inside, orbit_record orbit) {
-    if (n < orbit->iterations) {
-        *look = min(n + ORBIT_LOOK, orbit->iterations);
-        return orbit_cancelled(orbit);
-    }
-    *inside = *alive & in_set(square, orbit);
-    *alive &= ~*inside;
-    *look = INT_MAX;
-    return 0;
-}
 
 // Escape counts with `bailout` alone: applications until |z| > bailout, at most `iterations`.
 INLINE orbit_counted formula_escape_count(vec point, mask active, orbit_record orbit, constants k) {
@@ -107,85 +94,14 @@ INLINE orbit_end formula_end(vec point, mask active, int limit, orbit_record orb
     return end_by(0, point, active, limit, orbit, k);
 }
 
-// Distance and gradient by the full Jacobian J of the last z: g = |J^T z/|z||.
-//
-// The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
-// a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
-// sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`.
-INLINE clearance dual_distance_by(int usual, vec point, mask active, int of, orbit_record orbit,
-                                  constants k, surface_point *surface) {
-    dual_state c, z;
-    dual_start(point, k, &c, &z);
-    real square = dual_state_square(z);
-    real square_before = square;
-    real count = (real)((scalar)FIRST_COUNT);
-    mask alive = active & less_equal(square, (real)(orbit->distance_square));
-    mask inside = alive & ~alive, left = inside;
-    vec at_limit = vec_of(R(0.0), R(0.0), R(0.0));
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look) {
-            if (orbit_look(n, &look, square, &alive, &inside, orbit)) break;
-            if (of == OF_SURFACE && n == orbit->gradient_limit) {
-                left = alive;
-                at_limit = dual_state_gradient(z, R(1.0) / square);
-            }
-        }
-        if (!any_lane(alive)) break;
-        const dual_state next = dual_apply_by(usual, n, z, c, k);
-        z = dual_state_pick(alive, next, z);
-        square_before = pick(alive, square, square_before);
-        square = pick(alive, dual_state_square(next), square);
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(square, (real)(orbit->distance_square));
-    }
-    if (orbit->longest <= orbit->iterations) inside |= alive & in_set(square, orbit);
-    real distance;
-    if (HAS_SHAPE) {
-        // The last solid's distance in z, over how fast it changes per scene unit.
-        const dual solid = dual_solid_distance(z, k);
-        surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);
-        const real solid_growth = vec_dot(surface->gradient, surface->gradient);
-        distance = fmax(solid.v * pick(less(R(0.0), solid_growth), R(1.0) / sqrt(solid_growth), R(0.0)), R(0.0));
-        inside = active & less_equal(solid.v, R(0.0));
-    } else {
-        // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
-        const vec relative = dual_state_gradient(z, R(1.0) / square);
-        const real relative_square = vec_dot(relative, relative);
-        surface->gradient = vec_pick(left, at_limit, relative);
-        distance = distance_from_growth(square, R(1.0) / sqrt(relative_square), count, orbit);
-    }
-    surface->own.square = square;
-    surface->own.square_before = square_before;
-    const real step = pick(inside, R(0.0), distance);
-    return (clearance){step, {count, inside}, step};
-}
-
-CALLED void other_dual_distance(const vec *point, const mask *active, int of, clearance *found, surface_point *surface,
-                                orbit_record orbit, constants k) {
-    *found = dual_distance_by(0, *point, *active, of, orbit, k, surface);
-}
-
-#define USUAL_DUAL_DISTANCE(usual) case usual: return dual_distance_by(usual, point, active, of, orbit, k, surface);
-INLINE clearance formula_dual_distance(vec point, mask active, int of, orbit_record orbit, constants k, surface_point *surface) {
-    USUALLY(USUAL_DUAL_DISTANCE)
-    // What a call may write to stays in memory, also where it is not called: it is given copies.
-    const vec at = point;
-    const mask lanes = active;
-    clearance found;
-    surface_point own = *surface;
-    other_dual_distance(&at, &lanes, of, &found, &own, orbit, k);
-    *surface = own;
-    return found;
-}
-
 // Smooth escape count: where between two applications |z| passed the distance bailout. Degree > 1 grows doubly exponentially
 // (n + 1 - log(log|z| / log R) / log degree), degree 1 exponentially.
 INLINE real formula_smooth_count(orbit_end end, orbit_result result, orbit_record orbit) {
     const real log_radius = (real)(orbit->log_distance_bailout);
     real over;
-    if (LOGARITHMIC) over = log2(R(0.5) * log(fmax(result.square, R(1.0))) / log_radius) / (real)(orbit->log2_degree);
+    if (LOGARITHMIC) over = log2(R(0.5) * log(most(R(1.0), result.square)) / log_radius) / (real)(orbit->log2_degree);
     else over = (R(0.5) * log(result.square) - log_radius) / (R(0.5) * log(result.square / result.square_before));
-    const real smooth = end.count - pick(is_nan(over), R(0.0), clamp(over, R(0.0), R(1.0)));
+    const real smooth = end.count - pick(is_nan(over), R(0.0), bounded(over, R(0.0), R(1.0)));
     return pick(end.inside, (real)((scalar)orbit->iterations), smooth);
 }
 
@@ -194,105 +110,3 @@ INLINE real formula_potential(orbit_end end, orbit_result result, orbit_record o
     if (!LOGARITHMIC) return R(0.0);
     return R(0.34657359028) * quick_log2(result.square) * exp2(-end.count * (real)(orbit->log2_degree));
 }
-
-// The distance used for marching: the cheapest that the formula offers.
-#if HAS_DERIVATIVE
-// An orbit under way that carries the formula's own scalar derivative.
-typedef struct {
-    state c, z;
-    real growth, square, count;
-    mask alive, inside;
-} scalar_orbit;
-
-INLINE void scalar_orbit_begin(scalar_orbit *o, vec point, mask active, orbit_record orbit, constants k) {
-    start(point, k, &o->c, &o->z);
-    o->growth = R(1.0);
-    o->square = state_square(o->z);
-    o->count = (real)((scalar)FIRST_COUNT);
-    o->alive = active & less_equal(o->square, (real)(orbit->distance_square));
-    o->inside = o->alive & ~o->alive;
-}
-
-INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, orbit_record orbit, constants k) {
-    real next_growth = o->growth;
-    const state next = apply_derivative_by(usual, n, o->z, o->c, &next_growth, k);
-    o->z = state_pick(o->alive, next, o->z);
-    o->growth = pick(o->alive, next_growth, o->growth);
-    o->square = pick(o->alive, state_square(next), o->square);
-    o->count = pick(o->alive, (real)((scalar)(n + 1)), o->count);
-    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
-}
-
-// The distance by this derivative: |z| / g with g carried as one number.
-INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, orbit_record orbit, constants k) {
-    mask inside = o->inside;
-    if (orbit->longest <= orbit->iterations) inside |= o->alive & in_set(o->square, orbit);
-    real distance;
-    if (HAS_SHAPE) {
-        const real solid = solid_distance(o->z, k);
-        distance = fmax(solid / o->growth, R(0.0));
-        inside = active & less_equal(solid, R(0.0));
-    } else {
-        distance = distance_from_growth(o->square, sqrt(o->square) / o->growth, o->count, orbit);
-    }
-    const real step = pick(inside, R(0.0), distance);
-    return (clearance){step, {o->count, inside}, step};
-}
-
-INLINE clearance scalar_distance_by(int usual, vec point, mask active, orbit_record orbit, constants k) {
-    scalar_orbit o;
-    scalar_orbit_begin(&o, point, active, orbit, k);
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        if (n == look && orbit_look(n, &look, o.square, &o.alive, &o.inside, orbit)) break;
-        if (!any_lane(o.alive)) break;
-        scalar_orbit_apply(usual, &o, n, orbit, k);
-    }
-    return scalar_orbit_end(&o, active, orbit, k);
-}
-
-#define USUAL_DISTANCE(usual) case usual: return scalar_distance_by(usual, point, active, orbit, k);
-INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {
-    USUALLY(USUAL_DISTANCE)
-    return scalar_distance_by(0, point, active, orbit, k);
-}
-
-// The same of two packets side by side: an application is a chain of operations that wait for each other, and the processor works
-// on the other packet's meanwhile.
-INLINE void scalar_distances_by(int usual, const vec *points, const mask *active, clearance *found,
-                                orbit_record orbit, constants k) {
-    scalar_orbit a, b;
-    scalar_orbit_begin(&a, points[0], active[0], orbit, k);
-    scalar_orbit_begin(&b, points[1], active[1], orbit, k);
-    for (int n = FIRST_COUNT, look = min(ORBIT_LOOK, orbit->iterations); n < orbit->longest; ++n) {
-        int next_look = look;
-        if (n == look && (orbit_look(n, &next_look, a.square, &a.alive, &a.inside, orbit) |
-                          orbit_look(n, &look, b.square, &b.alive, &b.inside, orbit))) break;
-        // One of them may go on for long.
-        const int first = any_lane(a.alive), second = any_lane(b.alive);
-        if (!(first | second)) break;
-        if (first) scalar_orbit_apply(usual, &a, n, orbit, k);
-        if (second) scalar_orbit_apply(usual, &b, n, orbit, k);
-    }
-    found[0] = scalar_orbit_end(&a, active[0], orbit, k);
-    found[1] = scalar_orbit_end(&b, active[1], orbit, k);
-}
-
-CALLED void other_scalar_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
-    scalar_distances_by(0, points, active, found, orbit, k);
-}
-
-#define USUAL_DISTANCES(usual) case usual: scalar_distances_by(usual, points, active, found, orbit, k); return;
-INLINE void formula_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
-    USUALLY(USUAL_DISTANCES)
-    other_scalar_distances(points, active, found, orbit, k);
-}
-#else
-INLINE clearance formula_distance(vec point, mask active, orbit_record orbit, constants k) {
-    surface_point ignored;
-    return formula_dual_distance(point, active, OF_DISTANCE, orbit, k, &ignored);
-}
-
-INLINE void formula_distances(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
-    for (int i = 0; i < 2; ++i) found[i] = formula_distance(points[i], active[i], orbit, k);
-}
-#endif

@@ -28,7 +28,8 @@ INLINE real proof_most(int goal) { return goal == GOAL_TOUCH ? TOUCH_STEPS : PRO
 
 // Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
 INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings, orbit_record orbit) {
-    if (HAS_DERIVATIVE || !any_lane(m->proving)) return m->active;
+    const mask proving = m->proving & m->active;
+    if (HAS_DERIVATIVE || !any_lane(proving)) return m->active;
     const real cone = s->cone;
     const vec offset = vec_sub(s->point, s->on_ray);
     const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->set_radius), PROOF_LOW * cone);
@@ -36,8 +37,8 @@ INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings
     const real along = vec_dot(offset, m->r.direction);
     const real reach = proof_reach(goal) * cone;
     const mask astray = less(reach * reach, vec_dot(offset, offset) - along * along);
-    const mask arrived = m->proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
-    const mask failed = m->proving & ~arrived & (astray | less_equal(proof_most(goal), m->probes));
+    const mask arrived = proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
+    const mask failed = proving & ~arrived & (astray | less_equal(proof_most(goal), m->probes));
     m->found.hit |= arrived;
     m->found.last = pick(arrived, m->low, m->found.last);
     const real solid_t = m->t + along, apart = PROOF_AHEAD * cone;
@@ -46,7 +47,7 @@ INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
     const mask onward = failed & ~passed_between(m);
-    m->t = pick(onward, fmin(m->t + proof_onward(goal) * cone, m->limit), m->t);
+    m->t = pick(onward, least(m->t + proof_onward(goal) * cone, m->limit), m->t);
     m->step_before = pick(onward, proof_onward(goal) * cone, m->step_before);
     m->slope = pick(onward, R(-1.0), m->slope);
     m->landing |= failed;
@@ -62,20 +63,22 @@ INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, 
     if (HAS_DERIVATIVE) return touched;
     const mask done = touched & (bracketed | (is_point(m) & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone)));
     const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
-    if (!any_lane(m->proving | due)) return done;
+    const mask proving = m->proving & m->active;
+    if (!any_lane(proving | due)) return done;
     const vec downhill = vec_scale(vec_normalize(s->surface.gradient), R(-1.0));
     // Bolder while the slope keeps its direction and the distance does not shrink, timid once it has turned.
     const mask turned = less(vec_dot(downhill, m->probe_downhill), R(0.0));
     const mask slow = less(R(0.5) * m->probe_radius, s->radius);
-    m->factor = pick(m->proving, m->factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), PROOF_FACTOR);
-    m->probes = pick(m->proving, m->probes + R(1.0), R(0.0));
+    m->factor = pick(due, PROOF_FACTOR, pick(proving, m->factor * pick(turned, R(0.5), pick(slow, R(2.0), R(1.0))), m->factor));
+    m->probes = pick(due, R(0.0), pick(proving, m->probes + R(1.0), m->probes));
     m->proved_t = pick(due, hit_t, m->proved_t);
     m->proving |= due;
-    real down = m->factor * fmax(s->radius, PROOF_LANDED * s->cone);
+    real down = m->factor * most(PROOF_LANDED * s->cone, s->radius);
     // A pixel's march must miss nothing within its cone: a step that is too bold would overshoot and count as astray.
-    if (goal == GOAL_TOUCH) down = fmin(down, R(0.99) * proof_reach(goal) * s->cone);
-    m->probe = vec_pick(m->proving, vec_along(s->point, down, downhill), m->probe);
-    m->probe_downhill = downhill;
-    m->probe_radius = s->radius;
+    if (goal == GOAL_TOUCH) down = least(down, R(0.99) * proof_reach(goal) * s->cone);
+    const mask goes_down = proving | due;
+    m->probe = vec_pick(goes_down, vec_along(s->point, down, downhill), m->probe);
+    m->probe_downhill = vec_pick(goes_down, downhill, m->probe_downhill);
+    m->probe_radius = pick(goes_down, s->radius, m->probe_radius);
     return done;
 }

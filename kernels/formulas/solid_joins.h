@@ -45,9 +45,9 @@ INLINE void solid_hollow(orbit_record o, solid_found *all, solid_found more) {
     const mask counts = all->inside & less(all->far, wall);
     surface_replace(o, &all->surface, counts, more.surface);
     all->scale = pick(counts, more.scale, all->scale);
-    all->far = fmax(all->far, pick(more.inside, R(0.0), -more.far));
-    all->most = pick(more.inside, all_of_it, fmax(all->most, -more.far));
-    all->near = pick(more.inside, all_of_it, fmax(all->near, -more.far));
+    all->far = most(all->far, pick(more.inside, R(0.0), -more.far));
+    all->most = pick(more.inside, all_of_it, most(all->most, -more.far));
+    all->near = pick(more.inside, all_of_it, most(all->near, -more.far));
     all->apart = all->far;
     all->inside &= ~more.inside;
 }
@@ -55,7 +55,7 @@ INLINE void solid_hollow(orbit_record o, solid_found *all, solid_found more) {
 // How near a solid has to be so that its surface is the nearest, not those before it.
 INLINE real nearest_before(orbit_record o, const solid_found *all) {
     const scalar size = o->kind == SOLID_FORMULA ? o->ball_radius : fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
-    return pick(in_hollow(*all), fmin(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
+    return pick(in_hollow(*all), least(all->most, HOLLOW_NEAR * (real)(size)), all->apart);
 }
 
 // All distances by one way to put two together.
@@ -98,16 +98,16 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
     if (o->join == JOIN_SMOOTH) {
         // The smooth minimum of Quilez, of distances as they are: between both, a quarter of the width is added at most.
         const real width = (real)(o->smoothness), a = all->far / all->scale, b = more.far / more.scale;
-        const real share = fmax(width - fabs(a - b), R(0.0)) / width;
+        const real share = most(R(0.0), width - fabs(a - b)) / width;
         const mask closer = less(b, a);
         const mask flows = less(R(0.0), share) & ~in_hollow(*all);
         const real others = R(0.5) * share, of_more = pick(closer, R(1.0) - others, others);
         const vec gradient = vec_along(vec_scale(all->surface.gradient, R(1.0) - of_more), of_more, more.surface.gradient);
-        const real lower = fmin(a, b) - R(0.25) * width * share * share, scale = fmin(all->scale, more.scale);
+        const real lower = least(a, b) - R(0.25) * width * share * share, scale = least(all->scale, more.scale);
         const surface_point flowing = surface_flowing(all->surface, more.surface, closer, of_more);
         all->surface = surface_point_pick(flows, flowing, surface_point_pick(nearer, more.surface, all->surface));
         all->surface.gradient = vec_pick(flows, gradient, all->surface.gradient);
-#define FLOWING(a, b) pick(flows, lower * scale, fmin(a, b))
+#define FLOWING(a, b) pick(flows, lower * scale, least(a, b))
         FOLDED(FLOWING)
         all->scale = pick(flows, scale, pick(nearer, more.scale, all->scale));
         all->inside |= more.inside | (flows & less_equal(lower, R(0.0)));

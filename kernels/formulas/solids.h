@@ -1,4 +1,4 @@
-// What looks for a surface, or asks how an orbit goes, asks this: a formula by itself (orbit.h), or with JOINED several solids as one,
+// What looks for a surface, or asks how an orbit goes, asks this: a formula by itself (distances.h), or with JOINED several solids as one,
 // which are a list: formulas that have places of their own, and simple solids, joined one after the other. The first is the scene's own
 // formula.
 //
@@ -18,7 +18,7 @@
 #define ASKS_SURFACE(asks) (asks == ASK_SURFACE || asks == ASK_BEHIND)
 #define ASKS_GRADIENT(asks) (asks == ASK_GRADIENT || ASKS_SURFACE(asks))
 
-#include "formulas/orbit.h"
+#include "formulas/distances.h"
 #include "device/memory.h"
 #include "formulas/simple_solids.h"
 #include "formulas/solid_joins.h"
@@ -50,9 +50,9 @@ INLINE solid_found solid_ask(orbit_record o, vec point, mask active, int asks, r
     if (HAS_DERIVATIVE && !ASKS_GRADIENT(asks)) here = formula_distance(own, near, o, k);
     else here = formula_dual_distance(own, near, of, o, k, &there);
     // (Outside the ball an estimate may be much too large.)
-    const real most = pick(less(R(0.0), found.far), found.apart, (real)(REAL_LARGEST));
-    const real estimate = fmin(here.step * (real)(o->scale), most);
-    found.apart = pick(near, pick(within, estimate, fmax(estimate, found.far)), found.apart);
+    const real farthest = pick(less(R(0.0), found.far), found.apart, (real)(REAL_LARGEST));
+    const real estimate = least(here.step * (real)(o->scale), farthest);
+    found.apart = pick(near, pick(within, estimate, most(estimate, found.far)), found.apart);
     found.far = pick(within, estimate, found.far);
     found.near = pick(within, estimate, found.near);
     found.inside = within & here.end.inside;
@@ -91,8 +91,8 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, orbit_
     }
     *surface = all.surface;
     const mask inside = active & all.inside;
-    const real step = pick(inside, R(0.0), fmax(all.far, R(0.0)) / all.scale);
-    const real near = pick(inside, R(0.0), fmax(all.near, R(0.0)) / all.scale);
+    const real step = pick(inside, R(0.0), most(R(0.0), all.far) / all.scale);
+    const real near = pick(inside, R(0.0), most(R(0.0), all.near) / all.scale);
     return (clearance){step, {cost, inside}, near, all.scale, pick(in_hollow(all), all.most / all.scale, step)};
 }
 
@@ -115,20 +115,31 @@ INLINE clearance orbit_behind(vec point, mask active, orbit_record orbit, consta
     return solids_distance(&point, active, ASK_BEHIND, orbit, k, surface);
 }
 
-// How far rays may go: by the scalar rule, if the formulas have one.
-INLINE clearance orbit_step(vec point, mask active, orbit_record orbit, constants k) {
-    if (!JOINED) return formula_distance(point, active, orbit, k);
-    surface_point ignored;
-    return solids_distance(&point, active, ASK_STEP, orbit, k, &ignored);
+// How far rays may go: by the scalar rule, if the formulas have one, else with the gradient. `late`: of the lanes that are given, those
+// that go on with orbits `under_way`; and, as a result, those of which nothing is found yet.
+INLINE clearance orbit_step(march_orbit *under_way, vec point, mask active, mask *late, orbit_record orbit, constants k,
+                            surface_point *surface) {
+#if HAS_DERIVATIVE
+    if (!JOINED) return formula_scalar_orbit(under_way, point, active, late, CARRIES, orbit, k);
+    return solids_distance(&point, active, ASK_STEP, orbit, k, surface);
+#else
+    if (!JOINED) return formula_dual_orbit(under_way, point, active, late, OF_DISTANCE, CARRIES, orbit, k, surface);
+    return solids_distance(&point, active, ASK_GRADIENT, orbit, k, surface);
+#endif
 }
 
-INLINE void orbit_steps(const vec *points, const mask *active, clearance *found, orbit_record orbit, constants k) {
+#if HAS_DERIVATIVE
+// The same of two packets.
+INLINE void orbit_steps(march_orbit *a, march_orbit *b, const vec *points, const mask *active, mask *late, clearance *found,
+                        orbit_record orbit, constants k) {
     if (!JOINED) {
-        formula_distances(points, active, found, orbit, k);
+        formula_scalar_orbits(a, b, points, active, late, CARRIES, found, orbit, k);
         return;
     }
-    for (int i = 0; i < 2; ++i) found[i] = orbit_step(points[i], active[i], orbit, k);
+    surface_point ignored;
+    for (int i = 0; i < 2; ++i) found[i] = solids_distance(points + i, active[i], ASK_STEP, orbit, k, &ignored);
 }
+#endif
 
 // Which part of a distance rays may go; `own`: of a formula by itself.
 INLINE real step_scale_of(clearance here, scalar own) { return JOINED ? here.scale : (real)(own); }
@@ -151,8 +162,8 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, orbit_r
             const real radius = (R(1.0) + SOLID_NEAR) * (real)(o->ball_radius);
             const mask near = active & less(vec_dot(arm, arm), radius * radius);
             if (any_lane(near)) {
-                const int most = limit == orbit->iterations ? o->iterations : limit;
-                const orbit_end end = formula_end(own, near, most, o, k + o->first);
+                const int own_limit = limit == orbit->iterations ? o->iterations : limit;
+                const orbit_end end = formula_end(own, near, own_limit, o, k + o->first);
                 all.count += pick(near, end.count, R(0.0));
                 inside = near & end.inside;
             }

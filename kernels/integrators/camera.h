@@ -51,9 +51,9 @@ INLINE mask ray_clip(ray *r, __constant const scalar *center, real radius) {
     // Distance of the ray from the centre, by the perpendicular: b^2 - c would cancel for a far-off origin.
     const vec nearest = vec_along(offset, middle, r->direction);
     const real half_square = radius * radius - vec_dot(nearest, nearest);
-    const real half_chord = sqrt(fmax(half_square, R(0.0)));
-    r->near = fmax(r->near, middle - half_chord);
-    r->far = fmin(r->far, middle + half_chord);
+    const real half_chord = sqrt(most(R(0.0), half_square));
+    r->near = most(r->near, middle - half_chord);
+    r->far = least(middle + half_chord, r->far);
     return less(R(0.0), half_square) & less(r->near, r->far);
 }
 

@@ -197,7 +197,7 @@ INLINE lane_waits walk_share(share mine, queue q, __global scalar *state, int st
     lanes_begin(&m, places);
     for (int waits = 0;;) {
         const uint waiting = lanes_waiting(&m, &left, places, q, GOAL_WALK, w.settings);
-        if (waiting == ALL_LANES) return (lane_waits){waits, (int)lanes_sum(to_reals(m.waits))};
+        if (waiting == ALL_LANES) return (lane_waits){waits, march_waited(&m, w.settings)};
         waits += bits_count(waiting);
         walk_takes(&a, places, lanes_bits(m.active & equal(m.found.steps, R(0.0))), state, w.settings->state_at, stride);
         const mask before = m.active;

@@ -22,7 +22,17 @@ _DEFINED = re.compile(
     re.MULTILINE,
 )
 _INCLUDES = re.compile(
-    r'^#include "(?:[a-z]+/)*(?:lanes|vectors|structs|formula|orbits?|solids|numbers/\w+)\.h"\n', re.MULTILINE
+    r'^#include "(?:[a-z]+/)*(?:lanes|vectors|structs|formula|(?:\w+_)?orbits?|distances|solids|numbers/\w+)\.h"\n',
+    re.MULTILINE,
+)
+
+_ORBITS = (
+    "formulas/orbit.h",
+    "formulas/packet_orbits.h",
+    "formulas/dual_orbits.h",
+    "formulas/scalar_orbits.h",
+    "formulas/distances.h",
+    "formulas/solids.h",
 )
 
 HEAD = "".join(
@@ -41,6 +51,11 @@ HEAD = "".join(
 def kernel_file(name: str) -> str:
     """A file of the kernels folder without the headers that every program here begins with."""
     return _INCLUDES.sub("", (folder("kernels") / name).read_text(encoding="utf-8"))
+
+
+def orbit_files(*behind: str) -> str:
+    """The files that ask formulas by themselves, in the order in which they include each other, and others behind them."""
+    return "".join(map(kernel_file, (*_ORBITS, *behind)))
 
 
 def numbered(text: str, number: int) -> str:

@@ -94,7 +94,10 @@ __kernel void orbits(__global const scalar *points, __global scalar *result, int
         z = apply(n + FIRST_COUNT, z, c, k);
         dual_z = dual_apply(n + FIRST_COUNT, dual_z, dual_c, k);
 #if HAS_DERIVATIVE
-        apply_derivative(n + FIRST_COUNT, before, c, &growth, k);
+        // The state that goes with the scalar rule is the same one, or there is no growth.
+        const state beside = apply_derivative(n + FIRST_COUNT, before, c, &growth, k);
+        growth = pick(equal(beside.s0, z.s0) | is_nan(z.s0), growth, (real)(NAN));
+        growth = pick(equal(beside.s1, z.s1) | is_nan(z.s1), growth, (real)(NAN));
 #endif
     }
 }

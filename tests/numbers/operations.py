@@ -123,6 +123,21 @@ def table(precision: str) -> list[Operation]:
         above, inner = max_slopes(a, low), min_slopes(maximum(a, low), high)
         return above[0] * inner[0], above[1] * inner[0], inner[1]
 
+    def bounded(a: float, low: float, high: float) -> float:
+        return clamp(a, -1.0 if math.isnan(low) else low, 1.0 if math.isnan(high) else high)
+
+    def product_and(name: str, value: Callable[[Exact, Exact, Exact], Exact]) -> Operation:
+        # Whether a device rounds the product by itself is its own affair.
+        return Operation(
+            name,
+            3,
+            exactly(value),
+            (1.5, 1.5),
+            f"real_{name}(a, b, c)",
+            loose=lambda a, b, c: finite(a, b, c) and abs(mpf(a) * mpf(b)) > largest,
+            unit=lambda a, b, c: abs(mpf(a) * mpf(b)) + abs(mpf(c)),
+        )
+
     def both(name: str, arguments: str) -> tuple[str, str]:
         return f"real_{name}({arguments})", f"dual_{name}({arguments.upper()})"
 
@@ -172,6 +187,11 @@ def table(precision: str) -> list[Operation]:
             ("dual_mul(A, B)", "dual_mul_real(A, b)"),
             lambda a, b: (b, a),
         ),
+        # Another value with the same partials.
+        Operation("with", 2, lambda a, b: b, (0, 0), "", ("dual_with(A, b)",), lambda a, b: (1, 0)),
+        product_and("fma", lambda a, b, c: a * b + c),
+        product_and("fms", lambda a, b, c: a * b - c),
+        product_and("fnma", lambda a, b, c: c - a * b),
         Operation(
             "square", 1, exactly(lambda a: a * a), half, "", ("dual_square(A)",), lambda a: (2 * mpf(a),)
         ),
@@ -211,6 +231,9 @@ def table(precision: str) -> list[Operation]:
         Operation("min", 2, minimum, (0, 0), *_texts("min", "ab"), min_slopes),
         Operation("max", 2, maximum, (0, 0), *_texts("max", "ab"), max_slopes),
         Operation("clamp", 3, clamp, (0, 0), *_texts("clamp", "abc"), clamp_slopes),
+        Operation(
+            "bounded", 3, bounded, (0, 0), f"real_bounded(a, {_number_or('b', -1)}, {_number_or('c', 1)})"
+        ),
         Operation(
             "where",
             3,
@@ -361,6 +384,11 @@ def table(precision: str) -> list[Operation]:
 def _texts(name: str, arguments: str) -> tuple[str, tuple[str, ...]]:
     """The calls of an operation that has the same form over both number types."""
     return f"real_{name}({', '.join(arguments)})", (f"dual_{name}({', '.join(arguments.upper())})",)
+
+
+def _number_or(name: str, other: float) -> str:
+    """The text of an argument, of whose NaN it makes another number."""
+    return f"pick(is_nan({name}), R({float(other)}), {name})"
 
 
 def _axis(name: str) -> tuple[float, float, float]:

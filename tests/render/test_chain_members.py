@@ -13,7 +13,7 @@ from clfractal.formulas import catalog, reference
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
 from tests.devices import check_usable, device
-from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, orbit_files
 from tests.render.planes import plane_scene
 from tests.render.point_checks import agree, orbit_bytes
 from tests.render.shots import Floats, shoot
@@ -43,7 +43,7 @@ def chain_of(name: str) -> Chain:
 
 @lru_cache
 def program() -> SmallKernels:
-    tail = "".join(map(kernel_file, ("formulas/orbit.h", "formulas/solids.h", "formulas/points.cl")))
+    tail = orbit_files("formulas/points.cl")
     return formula_kernels(
         device(), batch_text([write_formula(chain_of(n)) for n in CHAINS], tail), "float64", 1
     )

@@ -19,7 +19,7 @@ from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.shading.kind_numbers import kind_text
 from tests.devices import device
-from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, kernel_file
+from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, orbit_files
 from tests.render.normals_oracle import unit
 from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
 from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
@@ -96,16 +96,7 @@ def compiled(text: str, precision: Precision, lanes: int) -> SmallKernels:
 def build(scene: Scene, kernel: str, precision: Precision, lanes: int) -> SmallKernels:
     """A kernel behind the scene's formula and the headers. What changes only numbers builds nothing anew."""
     head = kind_text() + "#define PALETTE_SIZE 256\n"
-    headers = "".join(
-        kernel_file(name)
-        for name in (
-            "formulas/orbit.h",
-            "formulas/solids.h",
-            "integrators/sampling.h",
-            "shading/coloring.h",
-            "shading/shade.h",
-        )
-    )
+    headers = orbit_files("integrators/sampling.h", "shading/coloring.h", "shading/shade.h")
     return compiled(HEAD + head + write_formula(scene.chain).text + headers + LOAD + kernel, precision, lanes)
 
 

@@ -217,3 +217,23 @@ def holds(
     # A light that shines not is asked for in vain.
     less = shoot(read(with_nothing(kind, asked)), device, channels=names)
     assert [name for name in names if name != "steps" and not same(whole, less, name)] == []
+
+
+def test_neighbours_that_flow_together_leave_no_trace(device: Device) -> None:
+    """Beside them a material is no blend of itself: that is not the same to the last bit."""
+    objects = {"drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"}}
+    asked = {
+        **PLAIN,
+        "formula": {"name": "mandelbulb", "iterations": 4},
+        "renderer": {"type": "surface", "samples": 4},
+        "lighting": {"mode": "path"},
+        "materials": {"skin": {"subsurface": {"weight": 0.8}}},
+        "material": {"name": "skin"},
+        "objects": objects,
+        "lights": [{"type": "sphere", "position": [9, 0, 9], "radius": 1}],
+    }
+    scene = read(asked)
+    whole = shoot(scene, device, channels=("R", "G", "B"))
+    few = shoot(scene, device, channels=("R", "G", "B"), region=(20, 7, 24, 12))
+    for name in few.channels:
+        np.testing.assert_array_equal(few[name], whole[name][7:19, 20:44])

@@ -18,7 +18,7 @@ from clfractal.formulas.opencl import write_formula
 from clfractal.integrators import points
 from tests.devices import check_usable, device
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
-from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, kernel_file
+from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels, orbit_files
 from tests.render.point_checks import Floats, agree, orbit_bytes
 from tests.small_kernels import SmallKernels
 
@@ -27,7 +27,7 @@ PRECISIONS: tuple[Precision, ...] = ("float32", "float64")
 
 def only(kernel: str) -> str:
     """`points.cl` after the formula, with one of its two kernels: the other would be compiled for nothing."""
-    text = "".join(map(kernel_file, ("formulas/orbit.h", "formulas/solids.h", "formulas/points.cl")))
+    text = orbit_files("formulas/points.cl")
     parts = re.split(r"^(?=__kernel )", text, flags=re.MULTILINE)
     kept = [part for part in parts[1:] if part.startswith(f"__kernel void {kernel}(")]
     assert len(kept) == 1

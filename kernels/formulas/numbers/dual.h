@@ -23,6 +23,9 @@ INLINE dual dual_chain4(real v, real fa, dual a, real fb, dual b, real fc, dual 
                     fa * a.dz + fb * b.dz + fc * c.dz + fd * d.dz};
 }
 
+// The same partials with another value: of a product and a sum that are rounded once.
+INLINE dual dual_with(dual a, real v) { return (dual){v, a.dx, a.dy, a.dz}; }
+
 INLINE dual dual_constant(real v) { return (dual){v, R(0.0), R(0.0), R(0.0)}; }
 
 // The coordinates of the point themselves, and adding one of them: partials 1, 0, 0 and so on.

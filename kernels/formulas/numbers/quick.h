@@ -21,7 +21,7 @@ INLINE real quick_exp2(real a) {
 #if REAL_IS_DOUBLE
     return exp2(a);
 #else
-    const real within = clamp(a, R(-126.0), R(126.0));
+    const real within = bounded(a, R(-126.0), R(126.0));
     const real whole = floor(within), part = within - whole;
     const real mantissa = R(1.0) + part * (R(0.6931530) + part * (R(0.2401475) + part * (R(0.0558534) + part * (R(0.0089505) +
                           part * R(0.0018956)))));

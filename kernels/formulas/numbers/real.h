@@ -5,12 +5,18 @@
 INLINE real real_add(real a, real b) { return a + b; }
 INLINE real real_sub(real a, real b) { return a - b; }
 INLINE real real_mul(real a, real b) { return a * b; }
+// A product and a sum in one expression, which compilers make one operation where the device has it (FP_CONTRACT is on).
+INLINE real real_fma(real a, real b, real c) { return a * b + c; }
+INLINE real real_fms(real a, real b, real c) { return a * b - c; }
+INLINE real real_fnma(real a, real b, real c) { return c - a * b; }
 INLINE real real_div(real a, real b) { return a / b; }
 INLINE real real_neg(real a) { return -a; }
 INLINE real real_abs(real a) { return fabs(a); }
 INLINE real real_min(real a, real b) { return fmin(a, b); }
 INLINE real real_max(real a, real b) { return fmax(a, b); }
 INLINE real real_clamp(real a, real low, real high) { return fmin(fmax(a, low), high); }
+// The same between bounds that are numbers.
+INLINE real real_bounded(real a, real low, real high) { return bounded(a, low, high); }
 INLINE real real_floor(real a) { return floor(a); }
 INLINE real real_mod(real a, real b) { return a - b * floor(a / b); }
 INLINE real real_exp(real a) { return exp(a); }
@@ -24,26 +30,26 @@ INLINE real real_where(mask m, real yes, real no) { return pick(m, yes, no); }
 INLINE real real_sign(real a) { return pick(less(R(0.0), a), R(1.0), pick(less(a, R(0.0)), R(-1.0), R(0.0))); }
 
 // 0 below 0.
-INLINE real real_sqrt(real a) { return sqrt(fmax(a, R(0.0))); }
+INLINE real real_sqrt(real a) { return sqrt(most(R(0.0), a)); }
 
 // 1/sqrt(a): infinite at 0 and below, where real_sqrt is 0; 0 at infinity. Within 2 ulp, as OpenCL demands of its rsqrt,
 // which on processors is a root and a division, one waiting for the other.
 INLINE real real_rsqrt(real a) {
 #ifdef estimate_rsqrt
     // One step of Newton's iteration squares the error of the processor's own estimate, which is exact at 0 and infinity.
-    const real positive = fmax(a, R(0.0));
+    const real positive = most(R(0.0), a);
     const real y = estimate_rsqrt(positive);
     const real refined = y + (R(0.5) * y) * (R(1.0) - (positive * y) * y);
     const mask usual = less_equal((real)(REAL_SMALLEST), positive) & less_equal(positive, (real)(REAL_LARGEST));
     return pick(usual, refined, y);
 #else
-    return R(1.0) / sqrt(fmax(a, R(0.0)));
+    return R(1.0) / sqrt(most(R(0.0), a));
 #endif
 }
 
 // The logarithm of the smallest normal float at and below 0, in every precision, so that all agree.
 #define LOG_SMALLEST S(1.1754943508222875e-38)
-INLINE real real_log(real a) { return log(fmax(a, (real)(LOG_SMALLEST))); }
+INLINE real real_log(real a) { return log(most((real)(LOG_SMALLEST), a)); }
 
 // Arguments outside [-1, 1] count as the nearer end.
 INLINE real real_asin(real a) { return asin(real_clamp(a, R(-1.0), R(1.0))); }

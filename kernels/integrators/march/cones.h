@@ -34,9 +34,9 @@ INLINE ray block_cone(real x, real y, real reach, world w) {
         const ray r = eye_ray(&at, w.view);
         const vec offset = vec_cross(vec_sub(r.origin, axis.origin), axis.direction);
         const vec aside = vec_cross(r.direction, axis.direction);
-        footprint = fmax(footprint, sqrt(vec_dot(offset, offset)));
+        footprint = most(footprint, sqrt(vec_dot(offset, offset)));
         // A tangent: how far aside the ray is for each unit along the axis.
-        spread = fmax(spread, sqrt(vec_dot(aside, aside)) / fmax(vec_dot(r.direction, axis.direction), R(0.1)));
+        spread = most(spread, sqrt(vec_dot(aside, aside)) / most(R(0.1), vec_dot(r.direction, axis.direction)));
     }
     const real wider = (real)(w.settings->cone_margin), detail = (real)(w.settings->detail);
     axis.footprint = axis.footprint * wider + footprint / detail;

@@ -42,6 +42,7 @@
 // processor's registers and units without that, and calls empty the registers.
 #define REFILL 1
 #define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && LANES > 1 ? 2 : 1)
+#define ORBITS_WAITED(m) (m)->under_way.lanes.waits
 
 INLINE sight march_place(const march *m) {
     sight s;
@@ -57,11 +58,12 @@ INLINE real near_of(clearance here, march_record settings) {
 
 // The step in a hollow: nothing counts as near there, but for what is joined to it.
 INLINE void march_blind(const march *m, sight *s, march_record settings) {
-    const real step = (real)(settings->step), first = fmax(BLIND_FIRST * s->cone, BLIND_LEAST * step);
-    const real pace = fmin(fmax(BLIND_GROWTH * m->step_before, first), step);
-    const real most = s->here.most * step_scale_of(s->here, settings->step_scale), free = fmin(fmax(fmax(pace, s->cone), s->radius), most);
+    const real step = (real)(settings->step), first = most(BLIND_FIRST * s->cone, BLIND_LEAST * step);
+    const real pace = least(most(first, BLIND_GROWTH * m->step_before), step);
+    const real farthest = s->here.most * step_scale_of(s->here, settings->step_scale);
+    const real free = least(most(most(s->cone, pace), s->radius), farthest);
     const mask unknown = is_blind(s->here);
-    s->blind = unknown & less(free, most);
+    s->blind = unknown & less(free, farthest);
     s->sure = pick(unknown & ~s->blind, free, s->radius);
     s->radius = pick(unknown, free, s->radius);
 }
@@ -77,7 +79,7 @@ INLINE real march_to_ball(const march *m, const sight *s, real *around, march_re
     const real square = BALL_NEAR * BALL_NEAR * radius * radius - vec_dot(nearest, nearest);
     const mask far = less(BALL_BEYOND * radius, away);
     *around = pick(far, away - radius, (real)(REAL_LARGEST));
-    return pick(far & less(R(0.0), ahead) & less(R(0.0), square), ahead - sqrt(fmax(square, R(0.0))), (real)(REAL_LARGEST));
+    return pick(far & less(R(0.0), ahead) & less(R(0.0), square), ahead - sqrt(most(R(0.0), square)), (real)(REAL_LARGEST));
 }
 
 // What the distance found at that place means for the march.
@@ -99,8 +101,9 @@ INLINE void march_measure(march *m, sight *s, int goal, march_record settings) {
     s->blind = less(R(1.0), R(0.0));
     s->sure = s->radius;
     if (HOLLOWS) march_blind(m, s, settings);
-    s->near = pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius);
-    if (settings->counts_waits) m->waits += orbit_waits(m->active, s->here.end.count);
+    s->near = JOINED ? pick(less(s->here.step, s->here.near), s->here.near * scale, s->radius) : s->radius;
+    // (Orbits that are left under way count for themselves.)
+    if (!CARRIES && settings->counts_waits) m->waits += orbit_waits(m->active, s->here.end.count);
     m->found.steps += pick(m->active, R(1.0), R(0.0));
     m->found.count += pick(m->active, s->here.end.count, R(0.0));
 }
@@ -123,20 +126,20 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     // Where the distance falls like that of a plane, the next sphere touches this one at 2 / (1 - slope) radii (Ban and
     // Valasek 2023, Automatic step size relaxation in sphere tracing).
     const mask landing = marching & ~overshot & ~at_ball(s) & less(s->radius, goal == GOAL_SURFACE ? LANDING * s->cone : R(0.0));
-    const real expected = (s->radius - LANDING_AIM * s->cone) / fmax(-slope, LEAST_SLOPE);
-    const real longer = clamp(R(2.0) / (R(1.0) - march_slope(m, s, goal, settings)), R(1.0), (real)(settings->relaxation));
+    const real expected = (s->radius - LANDING_AIM * s->cone) / most(LEAST_SLOPE, -slope);
+    const real longer = bounded(R(2.0) / (R(1.0) - march_slope(m, s, goal, settings)), R(1.0), (real)(settings->relaxation));
     const real relaxed = s->radius * pick(at_ball(s) | s->restless, R(1.0), longer);
     const real longest = pick(seeks_sheets(m, goal), LANDING_SHORT, LANDING_STEP) * s->cone;
-    real step = pick(landing & ~s->restless, fmax(fmin(expected, longest), s->radius), relaxed);
+    real step = pick(landing & ~s->restless, most(least(expected, longest), s->radius), relaxed);
     m->landing = (m->landing & ~marching) | landing;
     if (!HAS_DERIVATIVE) {
         m->landing |= marching & less(step, CREEP * s->cone);
-        step = fmax(step, CREEP * s->cone);
+        step = most(CREEP * s->cone, step);
     }
     m->limit = pick(overshot & s->here.end.inside, m->t, m->limit);
     step = pick(s->blind, s->radius, step);
-    step = fmin(step, s->to_ball);
-    step = fmin(step, m->limit - m->t);
+    step = least(step, s->to_ball);
+    step = least(step, m->limit - m->t);
     const real onward = pick(overshot, m->low + m->radius_before, m->t + step);
     m->step_before = pick(overshot, m->radius_before, pick(marching, step, m->step_before));
     m->slope = pick(overshot, R(-1.0), m->slope);
@@ -144,7 +147,7 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
     m->radius_before = pick(marching & ~overshot & ~early & ~s->here.end.inside & ~passed, known, m->radius_before);
     const mask bracketed = marching & less(m->high, (real)(REAL_LARGEST));
     const real free = pick(is_blind(s->here), R(0.0), s->radius);
-    const real narrower = fmax(R(0.5) * (m->low + m->high), fmin(m->low + free, m->high - BRACKETED * s->cone));
+    const real narrower = most(R(0.5) * (m->low + m->high), least(m->low + free, m->high - BRACKETED * s->cone));
     m->t = pick(bracketed, narrower, pick(early, m->low, pick(marching, onward, m->t)));
     march_between(m, s, marching & ~bracketed);
 }
@@ -153,13 +156,13 @@ INLINE void march_onward(march *m, const sight *s, mask marching, mask overshot,
 // leaves its ray's part ends beyond everything.
 INLINE void march_cone(march *m, const sight *s, march_record settings) {
     const real widens = (real)(settings->detail) * m->r.spread, all = R(1.0) + widens * widens;
-    const real free = (real)(settings->cone_share) * fmin(s->radius, s->around), square = free * free - s->cone * s->cone;
-    const real along = (sqrt(fmax(s->cone * s->cone * widens * widens + all * square, R(0.0))) - s->cone * widens) / all;
+    const real free = (real)(settings->cone_share) * least(s->radius, s->around), square = free * free - s->cone * s->cone;
+    const real along = (sqrt(most(R(0.0), s->cone * s->cone * widens * widens + all * square)) - s->cone * widens) / all;
     const mask known = less(s->here.step, (real)(REAL_LARGEST)) & ~is_blind(s->here);
     const mask onward = m->active & known & less(CONE_LEAST * s->cone, along) &
                         less(m->found.steps, (real)((scalar)settings->max_steps));
-    m->radius_before = s->radius;
-    m->step_before = along;
+    m->radius_before = pick(m->active, s->radius, m->radius_before);
+    m->step_before = pick(m->active, along, m->step_before);
     m->t += pick(onward, along, R(0.0));
     m->found.t = pick(m->active, pick(less(m->t, m->r.far), m->t, (real)(REAL_LARGEST)), m->found.t);
     m->active = onward & less(m->t, m->r.far);
@@ -173,7 +176,7 @@ INLINE mask march_too_early(march *m, mask inside, real cone, march_record setti
         ray whole = m->r;
         whole.near = R(0.0);
         ray_clip(&whole, settings->bounds_center, (real)(settings->bounds_radius));
-        m->low = pick(early, fmax(m->t - cone * m->found.steps, whole.near), m->low);
+        m->low = pick(early, most(m->t - cone * m->found.steps, whole.near), m->low);
     }
     return early;
 }
@@ -199,7 +202,7 @@ INLINE void march_act(march *m, sight s, int goal, march_record settings, orbit_
     const mask knew = less(m->radius_before, (real)(REAL_LARGEST));
     m->found.bad += pick(inside & free & ~m->landing & less(R(1.5), m->found.steps) & (HOLLOWS ? knew : inside), R(1.0), R(0.0));
     const mask measured = outside & free & less(R(0.0), m->step_before) & knew & ~s.blind & ~at_ball(&s);
-    real slope = clamp(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
+    real slope = bounded(pick(measured, (radius - m->radius_before) / m->step_before, m->slope), R(-1.0), R(0.9));
     // Points begin near the solid: their first look may be the last.
     slope = pick(is_point(m) & outside & ~knew, march_first_slope(m, &s, settings), slope);
     m->slope = pick(measured, m->slope + SLOPE_GAIN * (slope - m->slope), m->slope);
@@ -213,49 +216,64 @@ INLINE void march_act(march *m, sight s, int goal, march_record settings, orbit_
     real reach = cone;
     mask touched = outside;
     if (goal == GOAL_SURFACE) {
-        reach *= clamp(-LANDED * slope, LANDED_LEAST, LANDED_MOST);
+        reach *= bounded(-LANDED * slope, LANDED_LEAST, LANDED_MOST);
         mask landed = m->landing | less(s.near, LANDED_LEAST * cone);
         if (!settings->lands) {
-            reach = cone * clamp(-SEEN * slope, LANDED_LEAST, (real)(settings->near));
+            reach = cone * bounded(-SEEN * slope, LANDED_LEAST, (real)(settings->near));
             landed = outside;
         }
         landed |= is_point(m);
-        reach = pick(is_point(m), POINT_REACH * cone * clamp(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
+        reach = pick(is_point(m), POINT_REACH * cone * bounded(-LANDED * slope, POINT_LEAST, LANDED_MOST), reach);
         touched &= landed;
     }
     touched &= less(s.near, pick(passed_between(m), LANDED_LEAST * cone, reach));
-    real ahead = goal == GOAL_SURFACE ? fmin(s.near / fmax(-slope, GRAZING_SLOPE), GRAZING_MOST * cone) : R(0.0);
+    real ahead = goal == GOAL_SURFACE ? least(s.near / most(GRAZING_SLOPE, -slope), GRAZING_MOST * cone) : R(0.0);
     ahead = pick(passed_between(m), R(0.0), ahead);
     const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, (settings->lands ? BRACKETED : SEEN_BRACKETED) * cone) : inside;
     const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);
-    m->found.t = pick(done, pick(touched, fmin(m->t + ahead, m->high), m->low), m->found.t);
+    m->found.t = pick(done, pick(touched, least(m->t + ahead, m->high), m->low), m->found.t);
     m->active &= ~done;
     march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, passed, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
     // A lane that waits for others must not go on proving, or what it finds would depend on them.
-    m->proving &= m->active;
+    m->proving &= m->active | march_late(m);
+}
+
+// The lanes of which something is found act on it; those whose orbits are under way still do nothing yet.
+INLINE void march_act_in_time(march *m, sight s, mask late, int goal, march_record settings, orbit_record orbit) {
+    if (!CARRIES) {
+        march_act(m, s, goal, settings, orbit);
+        return;
+    }
+    m->late = m->active & late;
+    m->active &= ~late;
+    march_act(m, s, goal, settings, orbit);
+    m->active |= m->late;
 }
 
 // One step of the active lanes.
 INLINE void march_step(march *m, int goal, march_record settings, orbit_record orbit, constants k) {
     sight s = march_place(m);
-    if (HAS_DERIVATIVE) s.here = orbit_step(s.point, m->active, orbit, k);
-    else s.here = orbit_dual_distance(s.point, m->active, OF_DISTANCE, orbit, k, &s.surface);
-    march_act(m, s, goal, settings, orbit);
+    mask late = march_late(m);
+    s.here = orbit_step(&m->under_way, s.point, m->active, &late, orbit, k, &s.surface);
+    march_act_in_time(m, s, late, goal, settings, orbit);
 }
 
+#if HAS_DERIVATIVE
 // One step of two packets. Their orbits run side by side: an application is a chain of operations that wait for each other, and the
 // processor works on the other packet's meanwhile.
 INLINE void march_step_both(march *m, march *n, int goal, march_record settings, orbit_record orbit, constants k) {
     sight s = march_place(m), other = march_place(n);
     const vec points[2] = {s.point, other.point};
     const mask active[2] = {m->active, n->active};
+    mask late[2] = {march_late(m), march_late(n)};
     clearance found[2];
-    orbit_steps(points, active, found, orbit, k);
+    orbit_steps(&m->under_way, &n->under_way, points, active, late, found, orbit, k);
     s.here = found[0];
     other.here = found[1];
-    march_act(m, s, goal, settings, orbit);
-    march_act(n, other, goal, settings, orbit);
+    march_act_in_time(m, s, late[0], goal, settings, orbit);
+    march_act_in_time(n, other, late[1], goal, settings, orbit);
 }
+#endif

@@ -13,6 +13,7 @@
 
 #define REFILL 1
 #define ABREAST 1
+#define ORBITS_WAITED(m) 0
 
 typedef struct {
     ray r;
@@ -82,13 +83,13 @@ INLINE void march_step(march *m, int goal, march_record settings, orbit_record o
     MARCH_TESTS(m, point, here);
     const mask inside = m->active & here.inside, outside = m->active & ~here.inside;
     const mask done = march_misses(m, outside, cone) | march_places(m, inside, outside);
-    const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));
-    const real finest = fmax(EXIT_TOLERANCE * cone, R(2.0) * (real)(REAL_EPSILON) * size);
+    const real size = most(most(fabs(point.x), fabs(point.y)), most(fabs(point.z), m->t));
+    const real finest = most(EXIT_TOLERANCE * cone, R(2.0) * (real)(REAL_EPSILON) * size);
     march_narrows(m, inside, outside, m->active & ~m->narrow, finest, (real)(settings->near) * cone);
     m->found.hit |= done;
     m->active &= ~done;
-    const real entrance = fmax(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
-    m->t = march_goes_to(m, m->t + pick(m->entered, step, fmin(entrance, step)));
+    const real entrance = most(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
+    m->t = march_goes_to(m, m->t + pick(m->entered, step, least(entrance, step)));
     // The set may end where its bounds do.
     m->active &= less_equal(m->t, m->r.far + step);
 }

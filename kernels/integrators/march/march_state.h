@@ -19,6 +19,8 @@ typedef struct {
     real radius_before, step_before;
     mask waits;       // of each lane, see orbit_waits: of all its rays
     mask landing;     // the last step led to where the solid is expected
+    march_orbit under_way;
+    mask late;        // lanes whose orbits are under way still (CARRIES)
     // Of formulas without a scalar rule, whose hits are proved, and which may have sheets (see passed.h and proof.h):
     real facing;      // the cosine between the gradient at the last point before a surface and the ray
     real behind;      // a point at which the gradient follows the ray: the distance is least between `low` and this one
@@ -43,11 +45,14 @@ typedef struct {
 // Rays of a pixel's points: of these something is known.
 INLINE mask is_point(const march *m) { return less(m->r.known, RAY_NOTHING_KNOWN); }
 
+// Lanes whose orbits are under way.
+INLINE mask march_late(const march *m) { return CARRIES ? m->late : m->active & ~m->active; }
+
 // What is cut out leaves hollows.
 #define HOLLOWS (JOINED && settings->hollows)
 
 // Where a ray may go so far only because of the ball around a formula: there it is not near a surface, however narrow the step.
-INLINE mask at_ball(const sight *s) { return less(s->radius, s->near); }
+INLINE mask at_ball(const sight *s) { return JOINED ? less(s->radius, s->near) : less(R(1.0), R(0.0)); }
 
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
@@ -60,6 +65,7 @@ INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record sett
     m->radius_before = pick(fresh, (real)(REAL_LARGEST), m->radius_before);
     m->step_before = pick(fresh, R(0.0), m->step_before);
     m->landing &= ~fresh;
+    m->late &= ~fresh;
     if (HAS_DERIVATIVE) return;
     m->facing = pick(fresh, R(0.0), m->facing);
     m->behind = pick(fresh, (real)(REAL_LARGEST), m->behind);

@@ -15,6 +15,7 @@
 // Steps are too cheap, and those of neighbours too alike, for a pause before all lanes are done.
 #define REFILL LANES
 #define ABREAST 1
+#define ORBITS_WAITED(m) 0
 
 typedef struct {
     ray r;
@@ -29,10 +30,10 @@ typedef struct {
 // Lanes `fresh` begin a march along new rays; the others go on with theirs.
 INLINE void march_begin(march *m, ray r, mask fresh, int goal, march_record settings) {
     const real step = (real)(settings->step);
-    const real start = goal == GOAL_POINT ? clamp(r.known, r.near, r.far) : r.near;
+    const real start = goal == GOAL_POINT ? bounded(r.known, r.near, r.far) : r.near;
     MARCH_TAKES(m, r, fresh);
     m->t = pick(fresh, start, m->t);
-    m->pace = pick(fresh, goal == GOAL_SHADOW ? fmin(SHADOW_FIRST * r.footprint, step) : step, m->pace);
+    m->pace = pick(fresh, goal == GOAL_SHADOW ? least(SHADOW_FIRST * r.footprint, step) : step, m->pace);
     m->low = pick(fresh, start, m->low);
     m->high = pick(fresh, start, m->high);
     m->seen_outside &= ~fresh;
@@ -53,7 +54,7 @@ INLINE void march_step(march *m, int goal, march_record settings, orbit_record o
 
     // What is inside from the beginning of the ray on is hit there.
     const mask bracketed = m->seen_inside & m->seen_outside;
-    const real finest = R(2.0) * (real)(REAL_EPSILON) * fmax(fabs(m->t), step);
+    const real finest = R(2.0) * (real)(REAL_EPSILON) * most(fabs(m->t), step);
     const mask cut = inside & ~m->seen_outside & less_equal(m->t, m->r.near);
     const mask done = m->active & (narrows ? (bracketed & less_equal(m->high - m->low, finest)) | cut : inside);
     m->found.hit |= done;
@@ -62,9 +63,9 @@ INLINE void march_step(march *m, int goal, march_record settings, orbit_record o
     m->active &= ~done;
 
     // Far off a step may be less than numbers tell apart, and a footprint may be 0: a ray gets on all the same.
-    const real way = fmax(m->pace, finest);
-    const real onward = pick(inside, fmax(m->t - way, m->r.near), m->t + way);
+    const real way = most(m->pace, finest);
+    const real onward = pick(inside, most(m->t - way, m->r.near), m->t + way);
     m->t = pick(bracketed, R(0.5) * (m->low + m->high), onward);
-    m->pace = fmin(SHADOW_GROWTH * way, step);
+    m->pace = least(SHADOW_GROWTH * way, step);
     m->active &= less_equal(m->t, m->r.far);
 }

@@ -10,7 +10,7 @@
     const queue q = MARCH_QUEUE(known);                                                            \
     const share mine = share_of_item(ITEM, slice, q);                                              \
     if (mine.next >= mine.end || WAS_CANCELLED) return;                                            \
-    const lane_waits waits = march_share(mine, q, goal, settings, orbit, k);                              \
+    const lane_waits waits = march_share(mine, q, goal, settings, orbit, k);                       \
     look_at_share(mine, q, goal, settings, orbit, k);                                              \
     if (goal != GOAL_CONE) COUNT_LANE_WAITS(waits, STATISTICS_HERE)
 #define LOOK_AT_SURFACES(known)                                                                    \

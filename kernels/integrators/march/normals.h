@@ -38,7 +38,7 @@ INLINE plane_sums plane_add(plane_sums s, mask found, vec p) {
     // A row's x that differs by rounding alone would make slopes over x that overflow.
     const real dx = pick(less((real)(REAL_EPSILON) * fabs(dy), fabs(dx_given)), dx_given, R(0.0));
     const real count = s.n + pick(found, R(1.0), R(0.0));
-    const real share = pick(found, R(1.0), R(0.0)) / fmax(count, R(1.0));
+    const real share = pick(found, R(1.0), R(0.0)) / most(R(1.0), count);
     const real weight = share * s.n;
     s.n = count;
     s.x += share * dx_given;
@@ -75,7 +75,7 @@ INLINE vec normal_of_plane(plane_sums s, real *residual, mask *usable) {
     const mask planar = less((real)(THINNEST_PATTERN), (s.xx / spread) * (s.yy / spread));
     const real p2 = s.yz, p1 = s.xz - s.xy * s.yz;
     const vec normal = vec_normalize(vec_of(-p1, -p2, R(1.0)));
-    const real away = sqrt(s.zz / fmax(s.n, R(1.0))) * normal.z;
+    const real away = sqrt(s.zz / most(R(1.0), s.n)) * normal.z;
     *usable = planar & less(R(0.0), normal.z) & less_equal(away, (real)(REAL_LARGEST));
     *residual = pick(*usable, away, R(0.0));
     return vec_pick(*usable, normal, vec_of(R(0.0), R(0.0), R(1.0)));

@@ -43,7 +43,7 @@ INLINE void march_between(march *m, const sight *s, mask marching) {
 INLINE real march_slope(const march *m, const sight *s, int goal, march_record settings) {
     if (HAS_DERIVATIVE) return m->slope;
     const real facing = ray_facing(m, s), here = FACING_SLOPE * step_scale_of(s->here, settings->step_scale) * facing;
-    return pick(seeks_sheets(m, goal) & less(facing, R(0.0)), fmin(m->slope, here), m->slope);
+    return pick(seeks_sheets(m, goal) & less(facing, R(0.0)), least(m->slope, here), m->slope);
 }
 
 // The slope where none has been measured yet.

@@ -1,6 +1,12 @@
 // How a work-item marches its share of a queue: its lanes take ray after ray, so that none waits for others.
 
-// From each search: REFILL, idle lanes that are worth a pause for new rays, and ABREAST, packets that are marched side by side.
+// From each search: REFILL, idle lanes that are worth a pause for new rays; ABREAST, packets that are marched side by side;
+// ORBITS_WAITED, for how many applications lanes have waited in orbits that are left under way.
+
+// For how many applications lanes of a packet have waited in all, if that is counted.
+INLINE int march_waited(const march *m, march_record settings) {
+    return settings->counts_waits ? (int)lanes_sum(to_reals(m->waits)) + ORBITS_WAITED(m) : 0;
+}
 
 // The rays that one work-item marches: `next`, and every one that is `hop` further, before `end`.
 typedef struct {
@@ -103,9 +109,10 @@ INLINE lane_waits march_share(share mine, queue q, int goal, march_record settin
 #endif
         if (waiting == ALL_LANES) {
 #if ABREAST > 1
-            m.waits += n.waits;
+            return (lane_waits){waits, march_waited(&m, settings) + march_waited(&n, settings)};
+#else
+            return (lane_waits){waits, march_waited(&m, settings)};
 #endif
-            return (lane_waits){waits, (int)lanes_sum(to_reals(m.waits))};
         }
         waits += idle;
 #if ABREAST > 1

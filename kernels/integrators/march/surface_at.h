@@ -9,9 +9,9 @@
 #define BESIDE R(0.375)   // radians between the hit's gradient and that before it, up to which they may be of one body ...
 #define ASTRAY R(0.5)     // ... and from here on they are not
 
-// How much of something counts that is `a` from what it should be: all below `most`, nothing from `none` on.
-INLINE real share_below(vec a, real most, real none) {
-    return clamp((none - sqrt(vec_dot(a, a))) / (none - most), R(0.0), R(1.0));
+// How much of something counts that is `a` from what it should be: all below `all`, nothing from `none` on.
+INLINE real share_below(vec a, real all, real none) {
+    return bounded((none - sqrt(vec_dot(a, a))) / (none - all), R(0.0), R(1.0));
 }
 
 #define BEHIND_NEARER R(0.25)   // part of the height behind a wall at which the place is looked for next
@@ -64,11 +64,11 @@ INLINE surface_point surface_lit(ray r, ray_hit *met, mask active, march_record 
             asked &= less(met->touch, met->last) | less(met->touch, met->t);
             place = vec_along(r.origin, met->last, r.direction);
         } else if (i == 1) {
-            const real way = fmax(met->last - met->touch, R(0.01) * cone);
+            const real way = most(R(0.01) * cone, met->last - met->touch);
             at_hit = vec_normalize(vec_along(gradient, (met->t - met->last) / way, vec_sub(gradient, wide)));
             asked &= less(R(0.0), share_below(vec_sub(at_hit, wide), BESIDE, ASTRAY));
             const real height = (met->touch - met->t) * vec_dot(wide, r.direction);
-            place = vec_along(vec_along(r.origin, met->t, r.direction), fmax(height, R(0.0)), wide);
+            place = vec_along(vec_along(r.origin, met->t, r.direction), most(R(0.0), height), wide);
         } else {
             asked &= ~here.end.inside & less(R(0.5), vec_dot(gradient, gradient));
             const vec apart = vec_sub(gradient, at_hit), turned = vec_sub(at_hit, wide);
@@ -103,7 +103,7 @@ INLINE surface_point surface_polished(ray r, ray_hit *met, mask active, march_re
         const real move = i == 0 ? height : pick(usable, -height / slope, height);
         before = t;
         height_before = height;
-        t += pick(moves, clamp(move, -cone, cone), R(0.0));
+        t += pick(moves, bounded(move, -cone, cone), R(0.0));
     }
     met->touch = pick(active, t, met->touch);
     met->t = pick(active, t, met->t);
@@ -113,7 +113,7 @@ INLINE surface_point surface_polished(ray r, ray_hit *met, mask active, march_re
 // The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
 // exactly it is may matter.
 INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
-    met->touch = fmin(met->touch, met->last);
+    met->touch = least(met->touch, met->last);
     clearance there;
     vec normal;
     met->more_steps = met->more_count = R(0.0);
@@ -129,8 +129,8 @@ INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_rec
     // the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
     const vec arm = vec_sub(vec_along(r.origin, met->touch, r.direction), vec_splat(settings->bounds_center));
-    const real radius = (real)(settings->bounds_radius), least = (R(1.0) - ON_BOUNDS) * radius;
-    const mask cut = there.end.inside & less(least * least, vec_dot(arm, arm)) & less(vec_dot(arm, r.direction), R(0.0));
+    const real radius = (real)(settings->bounds_radius), nearly = (R(1.0) - ON_BOUNDS) * radius;
+    const mask cut = there.end.inside & less(nearly * nearly, vec_dot(arm, arm)) & less(vec_dot(arm, r.direction), R(0.0));
     normal = vec_pick(flat, vec_pick(cut, vec_scale(arm, R(1.0) / radius), vec_scale(r.direction, R(-1.0))), normal);
     // What is seen does not face away, but for a pixel's width past a rim. A hit on the far side of a sheet thinner than a pixel
     // does: mirrored, it stands for the near side.

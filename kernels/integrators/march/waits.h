@@ -1,8 +1,9 @@
-// How long lanes of a packet have waited for others while rays marched. All lanes of a packet go on until its longest one ends.
+// How long lanes of a packet have waited for others while rays marched. All lanes of a packet go on until its longest orbit ends, but
+// for the few that a march leaves under way (packet_orbits.h).
 
 typedef struct {
     int steps;         // lanes without a ray: in steps of the others
-    int applications;  // lanes with a ray, whose orbit had ended: in applications of the packet's longest orbit
+    int applications;  // lanes with a ray, whose orbit had ended: in applications of the others
 } lane_waits;
 
 // The largest of whole numbers of the lanes: of their halves, theirs, and so on.

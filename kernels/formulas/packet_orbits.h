@@ -1,0 +1,67 @@
+// Orbits that are under way for distances: a packet's lanes are applied together, each with a count of its own.
+//
+// A packet is applied until its longest orbit ends. Where marches are long, most of that is waiting: a few lanes near the solid take
+// many applications, and the others one or two. So a march may leave its packet's last few orbits as they are, and go on with them in
+// its next step, when the other lanes have begun theirs (CARRIES). No lane's numbers depend on that.
+#include "formulas/orbit.h"
+
+// What an orbit under way knows of its lanes, whichever derivative it carries.
+typedef struct {
+    real square;               // of the last |z|
+    mask count, alive, inside; // applications so far; lanes that go on; lanes within the bailout at the limit
+    int look;                  // applications until the limits may be reached, at the earliest
+    int waits;                 // lanes whose orbits had ended, in applications of the others, since the first one began
+} orbit_lanes;
+
+// Whether marches leave orbits under way (Facts.carries_orbits): not where turns of several formulas are one count for all lanes.
+#define CARRIES (!JOINED && CARRIES_ORBITS && LANES >= 8)
+#define CARRIED_MOST (LANES / 8)
+
+INLINE void orbit_lanes_begin(orbit_lanes *o, real square, mask late, mask active, orbit_record orbit) {
+    const mask fresh = active & ~late;
+    o->square = pick(late, o->square, square);
+    o->count = (o->count & late) | (~late & (mask)(FIRST_COUNT));
+    o->alive = (o->alive & late) | (fresh & less_equal(square, (real)(orbit->distance_square)));
+    o->inside &= late;
+    const int first = max(min(ORBIT_LOOK, orbit->iterations) - FIRST_COUNT, 0);
+    o->look = any_lane(late) ? min(o->look, first) : first;
+}
+
+INLINE void lanes_applied(orbit_lanes *o, real square, orbit_record orbit) {
+    o->square = pick(o->alive, square, o->square);
+    o->count -= o->alive;  // true is -1
+    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
+}
+
+// Looks at the limits, and says when to look again. An orbit that is within the bailout at `iterations` is inside; others go on for a
+// little longer.
+INLINE void lanes_look(orbit_lanes *o, orbit_record orbit) {
+    const mask limit = (mask)(orbit->iterations), longest = (mask)(orbit->longest);
+    o->inside |= o->alive & equal_ints(o->count, limit) & in_set(o->square, orbit);
+    o->alive &= ~(o->inside | equal_ints(o->count, longest));
+    if (orbit_cancelled(orbit)) o->alive &= ~o->alive;
+    scalar left[LANES];
+    lanes_store(to_reals(limit - o->count), left);
+    int look = ORBIT_LOOK;
+    for (uint bits = lanes_bits(o->alive); bits != 0;) {
+        const int lane = highest_bit(bits);
+        bits ^= 1u << lane;
+        const scalar here = left[lane] > S(0.0) ? left[lane] : left[lane] + (scalar)(orbit->longest - orbit->iterations);
+        if (here < (scalar)look) look = (int)here;
+    }
+    o->look = look;
+}
+
+// Whether a packet is applied once more. With `carries` it need not be where only a few lanes are left, and others have ended since
+// `begun` ones began.
+INLINE int lanes_go_on(orbit_lanes *o, uint begun, int carries, orbit_record orbit) {
+    if (o->look-- == 0) {
+        lanes_look(o, orbit);
+        --o->look;
+    }
+    if (!carries) return any_lane(o->alive);
+    const uint alive = lanes_bits(o->alive);
+    const int left = bits_count(alive), goes_on = left > CARRIED_MOST || (alive == begun && left != 0);
+    if (goes_on) o->waits += bits_count(begun) - left;
+    return goes_on;
+}
