@@ -1,6 +1,4 @@
 // Tables of what layers of a material reflect in all; `clfractal/shading/scattering.py` fills them and tells their layout.
-#include "device/gather.h"
-
 #define SMOOTHEST (R(1.0) / (real)((scalar)SMOOTHEST_PARTS))            // alpha, at the least
 #define SMOOTHEST_FUZZ (R(1.0) / (real)((scalar)SMOOTHEST_FUZZ_PARTS))
 #define ALBEDO_ROW (ALBEDO_COSINES + 1)
@@ -25,43 +23,44 @@ typedef struct {
     real of_direction, mean;
 } albedo;
 
-// Where a direction's cosine and a roughness lie in every table of roughnesses: the entry before, the head of its row, and the shares of
-// those behind. All lanes look up at a time.
-typedef struct {
-    ints entry, row;
-    real across, down;
-} albedo_place;
-
-INLINE albedo_place albedo_place_of(real cosine, real roughness) {
-    const real x = sqrt(clamp(cosine, R(0.0), R(1.0))) * (real)((scalar)(ALBEDO_COSINES - 1));
-    const real y = clamp(roughness, R(0.0), R(1.0)) * (real)((scalar)(ALBEDO_ROUGHNESSES - 1));
-    const real i = floor(least(x, (real)((scalar)(ALBEDO_COSINES - 2)))), k = floor(least(y, (real)((scalar)(ALBEDO_ROUGHNESSES - 2))));
-    const ints row = to_ints(k * (real)((scalar)ALBEDO_ROW));
-    return (albedo_place){row + to_ints(i), row, x - i, y - k};
-}
-
-// From a table of roughnesses, or from the one that begins so many numbers behind it in each lane.
-INLINE albedo albedo_there(__global const float *table, ints behind, albedo_place at) {
-    __global const float *next = table + ALBEDO_ROW, *means = table + ALBEDO_COSINES;
-    const ints entry = at.entry + behind, row = at.row + behind;
-    const real low = mix(gather_floats(table, entry), gather_floats(table + 1, entry), at.across);
-    const real high = mix(gather_floats(next, entry), gather_floats(next + 1, entry), at.across);
-    return (albedo){mix(low, high, at.down), mix(gather_floats(means, row), gather_floats(means + ALBEDO_ROW, row), at.down)};
-}
-
+// From a table of roughnesses.
 INLINE albedo albedo_at(__global const float *table, real cosine, real roughness) {
-    return albedo_there(table, (ints)(0), albedo_place_of(cosine, roughness));
+    scalar x[LANES], y[LANES], found[LANES], means[LANES];
+    lanes_store(sqrt(clamp(cosine, R(0.0), R(1.0))) * (real)((scalar)(ALBEDO_COSINES - 1)), x);
+    lanes_store(clamp(roughness, R(0.0), R(1.0)) * (real)((scalar)(ALBEDO_ROUGHNESSES - 1)), y);
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int i = min((int)x[lane], ALBEDO_COSINES - 2), k = min((int)y[lane], ALBEDO_ROUGHNESSES - 2);
+        const scalar across = x[lane] - (scalar)i, down = y[lane] - (scalar)k;
+        __global const float *low = table + k * ALBEDO_ROW, *high = low + ALBEDO_ROW;
+        found[lane] = mix(mix((scalar)low[i], (scalar)low[i + 1], across), mix((scalar)high[i], (scalar)high[i + 1], across), down);
+        means[lane] = mix((scalar)low[ALBEDO_COSINES], (scalar)high[ALBEDO_COSINES], down);
+    }
+    return (albedo){lanes_load(found), lanes_load(means)};
 }
 
 // From tables for square roots of the reflectance at normal incidence, the first of which is given.
 INLINE albedo albedo_of_root(__global const float *tables, real cosine, real roughness, real root) {
+    scalar at[LANES];
+    albedo low, high;
     real rest = clamp(root * (real)((scalar)ALBEDO_REFLECTANCES), R(0.0), (real)((scalar)ALBEDO_REFLECTANCES - S(1.001)));
     const real step = floor(rest);
     rest -= step;
-    const ints behind = to_ints(step * (real)((scalar)ALBEDO_TABLE));
-    const albedo_place at = albedo_place_of(cosine, roughness);
-    const albedo low = albedo_there(tables, behind, at), high = albedo_there(tables + ALBEDO_TABLE, behind, at);
-    return (albedo){low.of_direction + rest * (high.of_direction - low.of_direction), low.mean + rest * (high.mean - low.mean)};
+    // The same table for all lanes: those of another one are looked up again.
+    lanes_store(step, at);
+    albedo sum = {R(0.0), R(0.0)};
+    mask open = less(R(-1.0), step);
+    for (int lane = 0; lane < LANES; ++lane) {
+        if (!any_lane(open)) break;
+        const mask here = open & equal(step, (real)(at[lane]));
+        if (!any_lane(here)) continue;
+        open &= ~here;
+        __global const float *table = tables + (int)at[lane] * ALBEDO_TABLE;
+        low = albedo_at(table, cosine, roughness);
+        high = albedo_at(table + ALBEDO_TABLE, cosine, roughness);
+        sum.of_direction = pick(here, low.of_direction + rest * (high.of_direction - low.of_direction), sum.of_direction);
+        sum.mean = pick(here, low.mean + rest * (high.mean - low.mean), sum.mean);
+    }
+    return sum;
 }
 
 // Of a dielectric's boundary.

@@ -23,9 +23,9 @@ INLINE real mirror_share(const bsdf *b, real cosine) { return film_mirrored(b, f
 
 // With which probability each lobe is sampled: about by what it reflects.
 INLINE void bsdf_choices(bsdf *b, __global const float *tables) {
-    b->of_out = (albedo){R(0.0), R(0.0)};
-    if (any_of(b->dielectric * b->root)) b->of_out = specular_albedo(b, b->out, tables);
-    const real of_gloss = pick(b->emerges, R(0.0), film_mirrored(b, b->of_out.of_direction));
+    real of_gloss = R(0.0);
+    if (any_of(b->dielectric * b->root)) of_gloss = specular_albedo(b, b->out, tables).of_direction;
+    of_gloss = pick(b->emerges, R(0.0), film_mirrored(b, of_gloss));
     const real mirrored = b->metalness * fmax(luminance(b->metal), R(0.1)) + b->dielectric * of_gloss;
     real scattered = b->dielectric * (R(1.0) - of_gloss) * fmax(luminance(b->body), R(0.02)) + b->metalness * b->rough * R(0.3)
                            + luminance(b->fuzz);
@@ -86,9 +86,10 @@ INLINE color bsdf_parts(const bsdf *b, vec toward, real broad, real sharp, __glo
     color sum = none;
     if (any_of(b->dielectric)) {
         color body = eon_value(b->body, b->out, i, b->rough_body);
-        albedo o = b->of_out, other = {R(0.0), R(0.0)};
+        albedo o = {R(0.0), R(0.0)}, other = o;
         real gloss = R(0.0);
         if (any_of(b->root)) {
+            o = specular_albedo(b, b->out, tables);
             other = specular_albedo(b, i, tables);
             gloss = single * fresnel_dielectric(vec_dot(b->out, h), b->ior);
         }

@@ -39,7 +39,6 @@ typedef struct {
     real fuzz_rough, fuzz_albedo;
     real by_coat, by_gloss;   // probabilities of sampling the coat's highlight, the base's highlight; else the hemisphere
     real dielectric;          // part of the surface that has a body
-    albedo of_out;            // what its boundary reflects of the viewer's direction
     mask seen;                // whether the viewer is over the surface
     int relief;               // whether the normal is that of a relief; see bsdf_bumped.h
     vec surface, leans;       // the surface's own normal, and where the other one leans to, length 1 each
