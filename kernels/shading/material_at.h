@@ -100,8 +100,8 @@ INLINE pbr pbr_found(stage s, const interaction *here, world w) {
         pbr_mix mix = {0};
         pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
         pbr_add(&mix, pbr_at(s, &other, w), here->share, w);
-        // (A blend of one material alone is not that material to the last bit.)
-        p = pbr_pick(flows, pbr_mixed(mix, w), p);
+        // (A blend of one material alone is not that material to the last bit. A single lane that is here has two.)
+        p = LANES == 1 ? pbr_mixed(mix, w) : pbr_pick(flows, pbr_mixed(mix, w), p);
     }
     if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;
