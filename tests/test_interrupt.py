@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import re
 import signal
 import sys
@@ -10,6 +11,7 @@ import time
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -365,3 +367,11 @@ def test_the_first_signal_counts(tmp_path: Path, code: str) -> None:
     assert status == 143, told
     assert told.count("\n") == 1
     assert "--resume continues" in told
+
+
+def test_where_python_only_prints_an_exception_the_interrupt_comes_a_moment_later() -> None:
+    """The callback of an import's lock, by the name that this Python gives it."""
+    inner = importlib._bootstrap._get_module_lock.__code__.co_consts  # type: ignore[attr-defined]
+    (callback,) = (each for each in inner if getattr(each, "co_name", "") == "cb")
+    assert interrupt_module._swallows(SimpleNamespace(f_code=callback))  # type: ignore[arg-type]
+    assert not interrupt_module._swallows(SimpleNamespace(f_code=_after.__code__))  # type: ignore[arg-type]

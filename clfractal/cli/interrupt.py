@@ -65,9 +65,12 @@ def watch(last_words: Callable[[], None]) -> None:
         with suppress(OSError):
             os.set_blocking(writing, False)
 
-    def raise_once(number: int, _frame: FrameType | None) -> None:
+    def raise_once(number: int, frame: FrameType | None) -> None:
         global _came
         _came = number
+        if frame is not None and _swallows(frame):
+            _thread.start_new_thread(_again, (number,))
+            return
         for each in watched:
             signal.signal(each, _ignore)
         raise KeyboardInterrupt
@@ -76,6 +79,17 @@ def watch(last_words: Callable[[], None]) -> None:
         signal.signal(each, raise_once)
     signal.set_wakeup_fd(writing, warn_on_full_buffer=False)
     _thread.start_new_thread(_end_by_force, (reading, frozenset(watched), last_words))
+
+
+def _swallows(frame: FrameType) -> bool:
+    """Whether exceptions are only printed there: where an import gives its lock back, in a callback of a weak reference."""
+    code = frame.f_code
+    return code.co_filename == "<frozen importlib._bootstrap>" and code.co_name == "cb"
+
+
+def _again(number: int) -> None:
+    time.sleep(0.001)
+    _thread.interrupt_main(signal.Signals(number))
 
 
 def _ignore(_number: int, _frame: FrameType | None) -> None:

@@ -17,6 +17,7 @@ from clfractal.engine.job import Job
 from clfractal.engine.observer import Observer
 from clfractal.engine.run import NO_PIXELS, NO_TILES, Counters, Result, Tiles, WorkItem
 from clfractal.engine.stages import Span
+from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.images.tiles import TileGrid
 from clfractal.integrators.kept import Kept, Resources
 from clfractal.integrators.passes import PASS_ADD, PASS_KEEP, STATISTICS
@@ -292,7 +293,7 @@ class _Cutter:
         if self.packets == (0, 0):
             in_waves = drawing.wave.packets >= drawing.packets
             whole = int(min(size / self.per_tile, drawing.capacity)) if in_waves else 0
-            several = int(min(size / drawing.packets, self.most)) if in_waves else 0
+            several = self._with_room(int(min(size / drawing.packets, self.most))) if in_waves else 0
             chosen = self.take(max(whole, several, 1))
             if not len(chosen):
                 return None
@@ -314,6 +315,17 @@ class _Cutter:
             self.packets = self._some_packets(packets[1], size)
             self.sample = self.first
         return span
+
+    def _with_room(self, several: int) -> int:
+        """So many tiles, or one where the device has no room for what the parts of several keep."""
+        if several > 1 and self.places is None and self.end - self.first > 1:
+            try:
+                self.drawing.keep(self.most)
+            except DeviceError as error:
+                if error.status != STATUS_BAD_INPUT:
+                    raise
+                self.most = several = 1
+        return several
 
     def _some_packets(self, first: int, size: float) -> tuple[int, int]:
         """Packets of a tile from the first on: whole groups with all samples, one group, or a part of one."""
