@@ -236,7 +236,7 @@ def test_stages_of_wanted_rows(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
         return bench_stages.PictureRow(name, 16, 2.0, 0.0, 9, 99, 1.0, 0.0, None, None, 0, 0, (stage,))
 
     monkeypatch.setattr(bench_stages, "picture_row", row)
-    monkeypatch.setattr(bench_stages, "fma_peak", lambda device, precision: 100.0)
+    monkeypatch.setattr(bench, "fma_peak", lambda device, precision: 100.0)
     report = tmp_path / "stages.json"
     shell = Shell(owns_process=False)
     shell.quiet = True

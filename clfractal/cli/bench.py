@@ -122,6 +122,19 @@ def row_names() -> list[str]:
     return [*ROWS, GRID_ROW, *frames.ROWS, SHELL_ROW]
 
 
+def chosen_device(device: str | None, shell: Shell) -> tuple[Device, float]:
+    """The device, and its peak of fused multiply-adds, once it is known how many lanes suit it.
+
+    Raises:
+        DeviceError: there is none, or it failed.
+    """
+    chosen = choose(device)
+    shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
+    peak = fma_peak(chosen, "float32")
+    march_reports(chosen, "float32", on_start=shell.say)
+    return chosen, peak
+
+
 def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Sequence[str] = ()) -> None:
     """Measures the wanted rows, or every one, prints the table, and writes JSON if a file is named.
 
@@ -131,10 +144,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
         FileError: the file cannot be written.
     """
     names = chosen_rows(wanted, row_names(), json_file)
-    chosen = choose(device)
-    shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
-    peak = fma_peak(chosen, "float32")
-    march_reports(chosen, "float32", on_start=shell.say)
+    chosen, peak = chosen_device(device, shell)
     rows = []
     for name in names:
         if name == GRID_ROW:

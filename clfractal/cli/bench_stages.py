@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from clfractal.cli.bench import ROWS, chosen_rows, headline, report_of, tell
+from clfractal.cli.bench import ROWS, chosen_device, chosen_rows, headline, report_of, tell
 from clfractal.cli.shell import Shell
-from clfractal.device.peak import fma_peak
-from clfractal.device.select import Device, choose
+from clfractal.device.select import Device
 from clfractal.engine.job import Job
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
@@ -20,7 +19,6 @@ from clfractal.engine.prepare import prepare
 from clfractal.engine.run import Progress
 from clfractal.engine.run import run as do
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.integrators.lanes import march_reports
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 
@@ -74,10 +72,7 @@ def run(*, device: str | None, json_file: Path | None, shell: Shell, wanted: Seq
         FileError: the file cannot be written.
     """
     names = chosen_rows(wanted, list(ROWS), json_file)
-    chosen = choose(device)
-    shell.say(f"measuring {chosen.info.name}, {chosen.info.version}")
-    peak = fma_peak(chosen, "float32")
-    march_reports(chosen, "float32", on_start=shell.say)
+    chosen, peak = chosen_device(device, shell)
     rows = []
     for name in names:
         text, changes, repetitions = ROWS[name]
