@@ -200,6 +200,9 @@ class Session:
                 work = self._current = self._next()
                 if work is self._wanted:
                     self._wanted = None
+                # From here on: a move that came before the picture is begun would end one that was prepared.
+                begins = work.wanted if isinstance(work, Preparation) else work
+                self._shielded = isinstance(begins, Wanted) and begins.moving
             try:
                 if isinstance(work, Preparation):
                     self._arrived(work, token)

@@ -21,6 +21,7 @@ from clfractal.viewer.editing import edited
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from clfractal.viewer.preparing import differs_by_view, seen_from
+from clfractal.viewer.session import Session
 from clfractal.viewer.studio import Studio
 from tests.scenes import STEREO
 from tests.viewer.sessions import (
@@ -138,6 +139,26 @@ def test_where_each_value_is_a_program_each_that_was_begun_is_shown(device: Devi
         assert powers == sorted(powers)
         assert slow.begun - count == slow.ended - count == len(powers)
         assert (frame.request, frame.finished, power(frame)) == (number, True, 5.9)
+
+
+def test_a_move_as_a_prepared_picture_arrives_does_not_end_it(
+    device: Device, slow: Slow, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Before its first frame is begun, a move would find nothing that is to be finished."""
+    with session_on(device) as watch:
+        watch.finished(scene_of())
+        arrived, begun = Session._arrived, slow.begun
+
+        def as_it_moves(self: Session, *arguments: Any) -> None:
+            monkeypatch.setattr(Session, "_arrived", arrived)
+            self.request(of_own_text(6.1), follows=True)
+            arrived(self, *arguments)
+
+        monkeypatch.setattr(Session, "_arrived", as_it_moves)
+        watch.session.request(of_own_text(6.0), moving=True)
+        watch.shows(lambda frame: power(frame) == 6.0)
+        frame = watch.rest()
+        assert (power(frame), frame.finished, slow.ended - begun) == (6.1, True, 2)
 
 
 def test_the_old_picture_follows_the_camera(shown: Shown, slow: Slow) -> None:
