@@ -230,6 +230,8 @@ def _of_motion(seen: _Seen) -> list[str]:
 
 def _why_no_surface(seen: _Seen) -> str:
     """Why no ray met the set; empty if that need not be a mistake."""
+    if not seen.scene.has_set:
+        return ""
     center, radius = seen.scene.bounds
     if not any(_meets_ball(view.camera, np.array(center), radius).any() for view in seen.views):
         return (
@@ -321,6 +323,8 @@ def _of_solid(seen: _Seen) -> list[str]:
     """What is wrong with the solid itself: an eye within it, or a formula that never escapes."""
     scene, renderer = seen.scene, seen.scene.renderer
     volume = renderer if isinstance(renderer, VolumeRenderer) else None
+    if not scene.has_set:
+        return []
     if volume is not None and (scene.given is not None or volume.value == "iterations"):
         return []
     if seen.counts.hits == 0:

@@ -15,6 +15,7 @@ from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_fr
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.definition import Formula, inside
 from clfractal.formulas.evaluate import evaluate_constant
+from clfractal.formulas.nothing import EMPTY, NONE
 from clfractal.formulas.own import check_inside, find_own, library_names
 from clfractal.formulas.turns import MAX_START
 
@@ -36,7 +37,9 @@ def names() -> tuple[str, ...]:
 
 @cache
 def description(name: str) -> Mapping[str, Any]:
-    """A library file as plain data; FormulaError with the nearest name for one that does not exist."""
+    """A library file as plain data, or what `none` is; FormulaError with the nearest name for one that does not exist."""
+    if name == NONE:
+        return EMPTY
     if name not in names():
         raise FormulaError(unknown_name("formula", name, names()))
     return _read(folder("formulas/library") / f"{name}.yaml", f"{name}.yaml")[0]
@@ -69,7 +72,12 @@ def load_chain(formula: str | Path | Mapping[str, Any], parameters: Mapping[str,
 
     The mapping may be a scene's `formula` section (see `resolve`) or a formula itself. A name is one of the library or
     of one's own (`own.py`), with the current folder in the place of a scene's.
+
+    Raises:
+        FormulaError, FileError: as `resolve`; and for `none`, of which nothing can be asked.
     """
+    if formula == NONE or (isinstance(formula, Mapping) and formula.get("name") == NONE):
+        raise FormulaError("none is for scenes of objects alone; name a formula")
     spec: dict[str, Any] = {"parameters": parameters} if parameters else {}
     if isinstance(formula, Path) or (isinstance(formula, str) and formula.endswith((".yaml", ".yml"))):
         path = Path(formula)
@@ -219,6 +227,8 @@ class _Resolver:
             if not isinstance(entry, Mapping):
                 raise FormulaError("must be a mapping with name, file or inline", at)
             entry_key = _source_key(entry, at, (*_OPTIONS, *_TURNS))
+            if entry.get("name") == NONE:
+                raise FormulaError("none cannot be a member of a chain; remove it", inside(at, "name"))
             reader: _Resolver = self
             own = self._own(entry, at)
             if own is not None:

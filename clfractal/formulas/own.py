@@ -11,6 +11,7 @@ from pathlib import Path
 
 from clfractal.errors import FileError, FormulaError, Where, unknown_name
 from clfractal.files.resources import folder
+from clfractal.formulas.nothing import NONE
 
 FOLDERS_VARIABLE = "CLFRACTAL_FORMULAS"
 FOLDER = "formulas"
@@ -44,11 +45,11 @@ def own_files(beside: Path | None) -> Mapping[str, Path]:
         for path in map(each.joinpath, inside):
             if path.suffix in _ENDINGS and os.path.isfile(path):
                 found.setdefault(path.stem, path)
-    return {name: found[name] for name in sorted(found.keys() - set(library_names()))}
+    return {name: found[name] for name in sorted(found.keys() - {*library_names(), NONE})}
 
 
 def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
-    """The file of a formula that is not in the library; None for one that is.
+    """The file of a formula that is not in the library; None for one that is, and for `none`.
 
     A file in the folder beside the scene must lie within the scene's folder, links followed.
 
@@ -58,7 +59,7 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
             folder.
     """
     library = library_names()
-    if name in library:
+    if name in library or name == NONE:
         return None
     try:
         files = own_files(beside)

@@ -202,7 +202,8 @@ def march_record(
     lift, shadow = (SHADOW_LIFT, SHADOW_DETAIL) if lands else (FINE_LIFT, FINE_SHADOW * step_scale(scene))
     values = {
         "bounds_center": center,
-        "bounds_radius": radius,
+        # No ray comes nearer to a place than this.
+        "bounds_radius": radius if scene.has_set else 0.0,
         "set_radius": min(radius, scene.formula_bounds[1]),
         "ball_center": scene.chain.center,
         "ball_radius": scene.chain.radius,

@@ -129,7 +129,8 @@ def finest_steps(scene: Scene, view: View) -> float:
     found, radius = scene.bounds
     center = np.array(found)
     footprint = view.pixel_size(max(scene.image.height, scene.image.reference))
-    if view.eye is not None:
+    # (Objects are met by their equations: those that stand beside a formula do not count either.)
+    if view.eye is not None and scene.has_set:
         plane = float((view.center - view.eye) @ view.axis)
         # Inside the bounds the surface may be anywhere; what the camera is aimed at sets the scale.
         nearest = float(np.linalg.norm(center - view.eye)) - radius

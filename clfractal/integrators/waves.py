@@ -75,7 +75,7 @@ def asks_formula(scene: Scene) -> bool:
 def has_cones(scene: Scene, plan: Plan) -> bool:
     """Whether a cone for each block of pixels goes before the rays: those through a lens, or of a view that moves, have no
     common one."""
-    return scene.surface.search == "distance" and not has_lens(scene) and not plan.moving
+    return scene.has_set and scene.surface.search == "distance" and not has_lens(scene) and not plan.moving
 
 
 def has_lens(scene: Scene) -> bool:
@@ -180,7 +180,12 @@ def stage_name(stage: Stage) -> str:
 
 
 def march_kernels(scene: Scene, plan: Plan) -> tuple[str, ...]:
-    """The kernels of `march.cl`, `march_points.cl` or `march_steps.cl`: packets look at surfaces where they march."""
+    """The kernels of `march.cl`, `march_points.cl` or `march_steps.cl`: packets look at surfaces where they march.
+
+    Objects alone need none: no ray is sent to the set, whose bounds are empty (`march_record`).
+    """
+    if not scene.has_set:
+        return ()
     if scene.surface.search == "steps":
         found = ("step_rays", "look_where_steps_end")
     elif scene.surface.used_points.count > 1:
@@ -279,6 +284,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
 
 
 def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
+    if not kernels:
+        return
     yield Stage(kernels[0], OVER[kernels[0]], turns, {"goal": goal, "bounce": bounce})
     if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
         yield Stage(kernels[1], OVER[kernels[1]], turns)

@@ -15,6 +15,7 @@ from clfractal.files.channels import (
     NOISY,
     SURFACE_LAYERS,
 )
+from clfractal.scene.alone import check_alone
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
@@ -290,7 +291,7 @@ def _check_medium(scene: Scene, renderer: VolumeRenderer) -> None:
 
 def _check_lights(scene: Scene) -> None:
     """A grid from a file is not the formula's solid, so there lights may be anywhere."""
-    if isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None:
+    if not scene.has_set or (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
         return
     center, radius = scene.bounds
     candidates = [
@@ -346,6 +347,7 @@ def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -
 
 # In this order: of several mistakes the first one is told.
 _PARTS = (
+    check_alone,
     _check_steps,
     _check_volume,
     _check_planes,

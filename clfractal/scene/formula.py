@@ -4,8 +4,10 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
+from clfractal.formulas.nothing import NONE
 from clfractal.schema.base import Coordinate, Number, Section, check_one_of, problem, rule
 from clfractal.schema.fields import PLACE, WHOLE, Usual
+from clfractal.schema.hex_color import AlsoAs
 
 MAX_LINKS = 64
 MAX_LIVE = 32
@@ -76,10 +78,23 @@ class FormulaSpec(_Source):
             if self.chain is not None and getattr(self, key):
                 raise problem("belongs to the members of a chain, not to the chain", key)
 
+    @property
+    def is_none(self) -> bool:
+        """Whether there is no set: the scene shows objects alone."""
+        return self.name == NONE
+
     def mapping(self) -> dict[str, Any]:
         """Plain data with the given keys only; it loads back to an equal FormulaSpec."""
         plain: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
         return _without_empty(plain)
+
+
+def _word(value: Any) -> Any:
+    """The word `none` stands for the formula of that name."""
+    return {"name": NONE} if value == NONE else value
+
+
+Formula = Annotated[FormulaSpec, AlsoAs(_word, {"const": NONE})]
 
 
 def _without_empty(spec: dict[str, Any]) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from clfractal.scene.animation import Animation
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
-from clfractal.scene.formula import FormulaSpec
+from clfractal.scene.formula import Formula
 from clfractal.scene.glow import Glow
 from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting, PathLighting
@@ -25,7 +25,7 @@ from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
 from clfractal.scene.moved_cameras import with_words
 from clfractal.scene.named_files import grid_files, light_files, texture_files
-from clfractal.scene.objects import FormulaObject, Objects, ball_of_both
+from clfractal.scene.objects import FormulaObject, Objects, VolumeObject, ball_around, ball_of_both
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.reads import Reads, is_data, is_table, section_of
 from clfractal.scene.renderer import Renderer
@@ -34,7 +34,7 @@ from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.base import Section, Vector, own_errors
-from clfractal.schema.shape import Joined, Solid
+from clfractal.schema.shape import Ball, Joined, Solid
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -63,7 +63,7 @@ class Scene(Section):
     model_config = ConfigDict(frozen=False)
 
     version: Literal[1] = Field(description="version of this schema")
-    formula: FormulaSpec
+    formula: Formula
     camera: Camera
     # Defaults are data, checked when used: an instance here would build its model on import.
     image: Image = Field(default_factory=dict, validate_default=True)
@@ -143,6 +143,11 @@ class Scene(Section):
         return camera.framed(self.extent, self.image.width / self.image.height)
 
     @property
+    def has_set(self) -> bool:
+        """Whether there is a set beside the objects: `formula: none` has none."""
+        return not self.formula.is_none
+
+    @property
     def bounds(self) -> tuple[Vector, float]:
         """Centre and radius of the ball that is searched, scene units: the renderer's, or the formula's own."""
         own = self.renderer.bounds if isinstance(self.renderer, SurfaceRenderer) else None
@@ -150,7 +155,12 @@ class Scene(Section):
 
     @property
     def formula_bounds(self) -> tuple[Vector, float]:
-        """Centre and radius of the ball that holds the set, as formulas and objects say, scene units."""
+        """Centre and radius of the ball that holds the set, as formulas and objects say, scene units.
+
+        Of objects alone it is the ball around those that have an end.
+        """
+        if not self.has_set:
+            return ball_around(self.objects.values(), lambda each: _ball_of_grid(each, self.grids[each.file]))
         found = self.chain.center, self.chain.radius
         for name, part in self.joined.items():
             if isinstance(part, FormulaObject) and part.join in ("union", "smooth_union"):
@@ -448,6 +458,13 @@ class Scene(Section):
         if self.animation is not None:
             with_words(plain, self, self.animation.tracks)
         return plain
+
+
+def _ball_of_grid(each: VolumeObject, grid: "GivenGrid") -> Ball:
+    from clfractal.scene.object_grids import placed
+
+    extent = placed(each, grid).place.extent
+    return extent.center, extent.radius
 
 
 class _Reads(Reads):

@@ -1,6 +1,8 @@
 """Objects beside the set, by name: shapes, water, formulas and volumes."""
 
 import math
+from collections.abc import Callable, Iterable
+from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any, Literal, TypeAlias
 
 from pydantic import Field, model_validator
@@ -25,7 +27,7 @@ from clfractal.schema.base import (
 from clfractal.schema.fields import SCALE, Usual
 from clfractal.schema.kinds import in_order, members, one_of
 from clfractal.schema.names import ObjectName
-from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, turned_axes
+from clfractal.schema.shape import Angles, Ball, Joined, Level, ObjectBase, Sides, Solid, turned_axes
 
 MAX_OBJECTS = 64
 MAX_FORMULAS = 8
@@ -81,6 +83,16 @@ def ball_of_both(a: Ball, b: Ball) -> Ball:
     share = (radius - a[1]) / apart
     x, y, z = (p + share * (q - p) for p, q in zip(a[0], b[0], strict=True))
     return (x, y, z), radius
+
+
+def ball_around(objects: Iterable[ObjectBase], of_volume: "Callable[[VolumeObject], Ball]") -> Ball:
+    """The ball around all objects that have an end; without any, the unit ball around the origin."""
+    balls = [
+        each.ball if isinstance(each, Solid) else of_volume(each)
+        for each in objects
+        if isinstance(each, (Solid, VolumeObject))
+    ]
+    return reduce(ball_of_both, balls) if balls else ((0.0, 0.0, 0.0), 1.0)
 
 
 class FormulaObject(Joined):

@@ -48,7 +48,11 @@ class AlsoAs:
     def __get_pydantic_json_schema__(self, schema: Any, handler: Callable[[Any], dict[str, Any]]) -> Any:
         """Either form."""
         longer = handler(schema)
-        return longer if self.schema is None else {"anyOf": [longer, dict(self.schema)]}
+        if self.schema is None:
+            return longer
+        if "const" in self.schema:  # so that mistakes in the long form are marked at their own places
+            return {"if": {"type": "string"}, "then": dict(self.schema), "else": longer}
+        return {"anyOf": [longer, dict(self.schema)]}
 
 
 def listed(value: Any) -> Any:

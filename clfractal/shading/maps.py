@@ -274,7 +274,7 @@ def glass_bodies(scene: Scene) -> list[bool]:
     # (A cloud has no material of its own, and not the set's either.)
     named = scene.objects.values()
     return [
-        own,
+        own and scene.has_set,
         *(inside and not isinstance(each, VolumeObject) for inside, each in zip(others, named, strict=True)),
     ]
 

@@ -58,6 +58,8 @@ TAKEN: list[dict[str, Any]] = [
     {"cut_planes": [{"plane": {"normal": [0, 0, 1], "transform": [{"rotate_x": 30}]}, "cut": True}]},
     {"formula": {"name": "mandelbulb", "iterations": 6, "parameters": {"power": 7.5}, "live": ["power"]}},
     {"formula": {"name": "mandelbulb", "julia": [0.1, 0.2, 0.3]}},
+    {"formula": "none"},
+    {"formula": {"name": "none"}, "objects": {"ball": {}}},
     {
         "formula": {
             "chain": [

@@ -8,10 +8,11 @@ pytest.importorskip("imgui_bundle")
 
 from clfractal.errors import ClfractalError, FormulaError
 from clfractal.formulas import catalog
-from clfractal.viewer.panels import formula, formula_editor, formula_library
+from clfractal.scene.load import load_scene
+from clfractal.viewer.panels import formula, formula_editor, formula_library, scene_dock
 from clfractal.viewer.panels.formula_editor import Editing
 from clfractal.viewer.panels.ui import Ui
-from tests.viewer.panel_harness import Stage, make_ui
+from tests.viewer.panel_harness import Stage, make_ui, opened
 
 pytestmark = pytest.mark.usefixtures("drawing_context")
 
@@ -22,6 +23,26 @@ def test_every_formula_can_be_chosen_and_edited_as_text() -> None:
         assert ui.studio.edit({"formula": {"name": name, "iterations": 12}}), name
         text = formula_editor.text_of(ui.studio.scene.formula)
         assert formula_editor.read_formula(text) == catalog.description(name)
+
+
+def test_without_a_formula_panels_say_so_and_one_can_be_given() -> None:
+    ui = opened("version: 1\nformula: none\ncamera: {}\nobjects: {ball: {}}")
+    before = ui.studio.scene
+    ui.show.add("formula_editor")
+    Stage(ui, scene_dock.draw, window=False)
+    Stage(ui, formula_editor.draw, window=False)
+    assert ui.studio.scene is before
+    assert ui.studio.problems == {}
+    assert formula.summary(ui) == "None"
+    assert typed(ui, formula_editor.text_of(before.formula)).error is not None
+    assert ui.studio.scene is before
+    text = formula_editor.text_of(load_scene("scenes/mandelbulb.yaml").formula)
+    assert typed(ui, text).error is None
+    assert ui.studio.scene.has_set
+    assert ui.studio.undo("scene")
+    assert ui.studio.scene == before
+    assert formula_library.take(ui.studio, {"name": "hast", "iterations": 12})
+    assert ui.studio.scene.has_set
 
 
 def test_a_chain_of_the_library_becomes_members_with_the_same_picture() -> None:

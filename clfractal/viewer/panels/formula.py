@@ -30,6 +30,10 @@ def draw(ui: Ui) -> None:
     if not w.filtering(ui):
         _choice(ui)
     w.problem(ui, "formula")
+    if not ui.studio.scene.has_set:
+        if not w.filtering(ui):
+            w.hint(ui, "There is no formula: the scene shows objects alone.")
+        return
     if root is not None:
         _members(ui, root)
     elif len(chain.links) == 1:
@@ -73,7 +77,8 @@ def _choice(ui: Ui) -> None:
     w.in_row(4)
     w.act(ui, "formula", theme.CODE, "Edit it as text", on="formula_editor" in ui.show)
     w.in_row(4)
-    if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=chain_path(ui) is None):
+    can_open = chain_path(ui) is None and ui.studio.scene.has_set
+    if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=can_open):
         _open_chain(ui)
     name = formula_library.chosen(ui, "##library", formula.name or "", single=False)
     if name is not None:

@@ -100,6 +100,25 @@ def _samples(ui: Ui) -> None:
 def _surface(ui: Ui, renderer: SurfaceRenderer) -> None:
     scene = ui.studio.scene
     radius = renderer.bounds.radius if renderer.bounds is not None else scene.chain.radius
+    if scene.has_set:
+        _search(ui, renderer, radius)
+    else:
+        radius = scene.bounds[1]
+    w.group(ui, "Normals")
+    # Normals of a grid need its points, so one choice would not do without the other.
+    w.field(ui, "renderer.normal", keep={"renderer.points": None})
+    _points(ui, renderer)
+    w.group(ui, "Light")
+    w.fields(ui, "renderer", ("bounces", "firefly_limit"), firefly_limit={"auto": "no limit"})
+    if w.optional(ui, "renderer.ambient_occlusion", "Occlusion", {}, keeps=False):
+        w.field(ui, "renderer.ambient_occlusion.rays")
+        half = radius / 2
+        w.field(ui, "renderer.ambient_occlusion.distance", start=half, auto=f"{half:.3g}")
+
+
+def _search(ui: Ui, renderer: SurfaceRenderer, radius: float) -> None:
+    """How rays look for the set."""
+    scene = ui.studio.scene
     w.group(ui, "Search")
     w.field(ui, "renderer.search", segmented=True)
     if renderer.search == "steps":
@@ -114,16 +133,6 @@ def _surface(ui: Ui, renderer: SurfaceRenderer) -> None:
     first = {"center": list(chain.center), "radius": float(f"{chain.radius:.4g}")}
     if w.optional(ui, "renderer.bounds", "Own bounds", first, keeps=False):
         w.fields(ui, "renderer.bounds", ("center", "radius"))
-    w.group(ui, "Normals")
-    # Normals of a grid need its points, so one choice would not do without the other.
-    w.field(ui, "renderer.normal", keep={"renderer.points": None})
-    _points(ui, renderer)
-    w.group(ui, "Light")
-    w.fields(ui, "renderer", ("bounces", "firefly_limit"), firefly_limit={"auto": "no limit"})
-    if w.optional(ui, "renderer.ambient_occlusion", "Occlusion", {}, keeps=False):
-        w.field(ui, "renderer.ambient_occlusion.rays")
-        half = radius / 2
-        w.field(ui, "renderer.ambient_occlusion.distance", start=half, auto=f"{half:.3g}")
 
 
 def _points(ui: Ui, renderer: SurfaceRenderer) -> None:

@@ -1,0 +1,120 @@
+"""Scenes of objects alone: no march is launched, and nothing but the march is missing in their pictures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import clfractal
+from clfractal.device.select import Device
+from clfractal.files.exr import read_exr
+from clfractal.integrators.surface import PROGRAMS, program_texts
+from clfractal.integrators.waves import surface_stages
+from tests.render.objects_oracle import NOWHERE, met
+from tests.render.shots import PERSPECTIVE, beside, plan_of, rays, shoot
+from tests.scenes import scene_of
+from tests.shell import InProcess, works
+from tests.variants import one_of
+
+OF_FORMULAS = {name for each in PROGRAMS if each.formula for name in each.kernels}
+OBJECTS: dict[str, Any] = {
+    "floor": {"type": "plane", "position": [0, 0, -0.6]},
+    "ball": {"radius": 0.6, "material": "glass"},
+    "sea": {"type": "water", "position": [0, 0, -0.5], "material": "sea"},
+    "ring": {"type": "torus", "position": [0.9, 0.2, 0], "radius": 0.3, "tube": 0.1},
+}
+SECTIONS: dict[str, Any] = {
+    "objects": OBJECTS,
+    "materials": {
+        "glass": {"specular": {"roughness": 0}, "transmission": {"weight": 1}},
+        "sea": {
+            "specular": {"ior": 1.33},
+            "transmission": {"weight": 1, "color": [0.5, 0.8, 0.9], "depth": 1},
+        },
+    },
+    "lights": [
+        {"direction": [1, 1, -1], "angular_size": 3},
+        {"type": "sphere", "position": [1, -2, 3], "radius": 0.4, "intensity": 20},
+    ],
+    "fog": {"density": 0.05, "scattering": {}},
+}
+WAYS: dict[str, dict[str, Any]] = {
+    "paths": {"lighting": {"mode": "path", "bounces": 6}, "renderer": {"samples": 2}},
+    "milk": {
+        "lighting": {"mode": "path", "bounces": 6},
+        "materials": {
+            **SECTIONS["materials"],
+            "glass": {"transmission": {"weight": 1, "color": [0.9] * 3, "depth": 0.5, "scatter": [0.8] * 3}},
+        },
+        "fog": None,
+    },
+    "direct": {"renderer": {"bounces": 2, "ambient_occlusion": {"rays": 2, "distance": 0.5}}},
+    "points": {"renderer": {"points": {"pattern": "grid", "count": 9}, "normal": "least_squares"}},
+    "steps": {"renderer": {"search": "steps", "step": 0.1}},
+    "cut": {
+        "cut_planes": [
+            {"opacity": 0, "cut": True, "objects": ["ring"], "plane": {"center": [0.9, 0.2, 0], "normal": [0, -1, 0]}}
+        ]
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("lanes", one_of(None, 1))
+@pytest.mark.parametrize("way", WAYS)
+def test_a_picture_has_the_bits_of_one_with_a_set_that_nobody_sees(
+    device: Device, way: str, lanes: int | None
+) -> None:
+    sections = {**SECTIONS, **WAYS[way]}
+    shown = [
+        shoot(scene_of(formula, PERSPECTIVE, (32, 24), **sections), device, lanes=lanes)
+        for formula in ("none", NOWHERE)
+    ]
+    for name in ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z"):
+        np.testing.assert_array_equal(shown[0][name], shown[1][name])
+    assert shown[0]["R"].std() > 0.01
+
+
+def test_a_ball_is_where_its_equation_is_zero(device: Device) -> None:
+    scene = scene_of("none", PERSPECTIVE, (48, 40), objects={"ball": {"radius": 0.8}}, background=[0, 0, 0])
+    framebuffer = shoot(scene, device)
+    t, normal, _ = met(scene, *rays(scene)[:2])
+    found = beside(framebuffer, scene, t, normal, 1)
+    assert found.both.sum() > 100
+    assert found.deep.max() < 5e-6
+    assert (found.turned > 1e-3).sum() <= 3
+
+
+def test_without_objects_the_background_is_seen(device: Device) -> None:
+    framebuffer = shoot(scene_of("none", PERSPECTIVE, (16, 12), background=[0.2, 0.4, 0.8]), device)
+    assert (framebuffer["A"] == 0).all()
+    np.testing.assert_allclose(framebuffer["B"], 0.8, rtol=1e-6)
+
+
+@pytest.mark.parametrize("way", [name for name in WAYS if name != "cut"])
+def test_nothing_that_knows_a_formula_is_launched(device: Device, way: str) -> None:
+    scene = scene_of("none", PERSPECTIVE, (32, 24), **{**SECTIONS, **WAYS[way]})
+    for lanes in (1, 8):
+        plan = plan_of(scene, device, lanes=lanes)
+        assert OF_FORMULAS.isdisjoint(stage.kernel for stage in surface_stages(scene, plan, (0, 2)))
+        assert not {each.name for each in program_texts(scene, plan)} & {
+            each.name for each in PROGRAMS if each.formula
+        }
+
+
+def test_a_picture_is_a_scene_again_and_can_be_resumed(clf: InProcess, tmp_path: Path) -> None:
+    scene, whole = tmp_path / "alone.yaml", tmp_path / "whole.exr"
+    scene.write_text(
+        "version: 1\nformula: none\ncamera: {position: [0, -3, 1]}\nimage: {width: 40, height: 36}\n"
+        "objects: {floor: {type: plane, position: [0, 0, -0.5]}, ball: {}}\nrenderer: {samples: 2}\n"
+    )
+    works(clf("render", scene, "-o", whole, "--quiet"))
+    assert not clfractal.load_scene(whole).has_set
+    again, resumed = tmp_path / "again.exr", tmp_path / "resumed.exr"
+    works(clf("render", whole, "-o", again, "--quiet"))
+    works(clf("render", scene, "-o", resumed, "--quiet", "--resume"))
+    for each in (again, resumed):
+        for name in "RGBAZ":
+            np.testing.assert_array_equal(read_exr(each)[0][name], read_exr(whole)[0][name])
