@@ -13,6 +13,7 @@ from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device, is_simulator
 from clfractal.device.threads import ending_together
 from clfractal.engine.canvas import CanvasKernels
+from clfractal.engine.carry import Carrier
 from clfractal.engine.drawing import Drawing, OutputBuffers, Wanted
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
@@ -90,8 +91,8 @@ class Precompilation:
 
     @property
     def steps(self) -> int:
-        """How many steps `run` has: programs, grids, and the two programs of a window."""
-        return len(self._wanted) + len(self._volumes) + 2
+        """How many steps `run` has: programs, grids, and the three programs of a window."""
+        return len(self._wanted) + len(self._volumes) + 3
 
     def run(self, progress: Callable[[int], None]) -> Compiled:
         """Compiles what the cache lacks, side by side.
@@ -108,7 +109,7 @@ class Precompilation:
         with ending_together(children.processors()) as (pool, ended):
             # Those of a window and of volumes build their own programs, which are not counted.
             works: list[Callable[[], object]] = [
-                *(partial(make, self.device) for make in (CanvasKernels, Shower)),
+                *(partial(make, self.device) for make in (CanvasKernels, Shower, Carrier)),
                 *(partial(self._fill, job, ended) for job in self._volumes),
                 *(partial(self._build, each, ended) for each in wanted),
             ]

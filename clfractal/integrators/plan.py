@@ -43,6 +43,7 @@ class Plan:
         channels: what the framebuffer holds, in order.
         divider: n for a coarse picture, which has every nth pixel of the picture in each direction; the region is counted
             in these.
+        offset: to the right and down, pixels of the picture by which those of a coarse one are moved.
         moving: whether the view moves while the picture is taken.
     """
 
@@ -53,6 +54,13 @@ class Plan:
     channels: tuple[str, ...]
     divider: int = 1
     moving: bool = False
+    offset: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def first(self) -> tuple[float, float]:
+        """The place of its pixel (0, 0) in the picture, pixels from the corner."""
+        middle = (self.divider + (self.divider > 1)) / 2
+        return middle + self.offset[0], middle + self.offset[1]
 
 
 @dataclass(frozen=True, slots=True)
@@ -122,6 +130,14 @@ class PlannedView:
         left, top = region.x // divider, region.y // divider
         small = Region(left, top, -(-region.right // divider) - left, -(-region.bottom // divider) - top)
         return replace(self, plan=replace(self.plan, samples=1, region=small, divider=divider))
+
+    def sparse(self, divider: int, phase: tuple[int, int]) -> PlannedView:
+        """Every second pixel of the coarse view in each direction, from column and row `phase` on: 0 or 1."""
+        half = self.coarse(2 * divider)
+        to = self.coarse(divider).plan.first
+        at = half.plan.first
+        offset = (to[0] + divider * phase[0] - at[0], to[1] + divider * phase[1] - at[1])
+        return replace(half, plan=replace(half.plan, offset=offset))
 
 
 def finest_steps(scene: Scene, view: View) -> float:

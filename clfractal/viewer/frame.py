@@ -20,9 +20,10 @@ class Growth:
 
     Attributes:
         views: as rendered (coarse ones, while it is coarse).
-        divider: pixels, in each direction, that one ray stands for.
+        divider: pixels, in each direction, that one of the canvas stands for.
         samples: that every pixel has.
         finished: whether it has the bits of the shell's picture.
+        carried: whether most pixels come from the frame before, see `clfractal.engine.carry`.
         seconds: that rendering took so far, without compiling.
         frame_seconds: that the last pass took.
         smoothing: how strongly the noise of each view is smoothed when it is shown, see `clfractal.engine.show`.
@@ -32,16 +33,18 @@ class Growth:
     divider: int
     samples: int
     finished: bool
+    carried: bool
     seconds: float
     frame_seconds: float
     smoothing: tuple[float, ...]
 
     @classmethod
     def coarse(
-        cls, views: tuple[PlannedView, ...], divider: int, seconds: float, frame_seconds: float
+        cls, views: tuple[PlannedView, ...], carried: bool, seconds: float, frame_seconds: float
     ) -> Growth:
-        """That of a coarse picture, which has one sample for each of its own pixels."""
-        return Growth(views, divider, 1, False, seconds, frame_seconds, (smoothing_of(1),) * len(views))
+        """That of a coarse or moving picture, which has one sample for each of its own pixels."""
+        smoothing = (smoothing_of(1),) * len(views)
+        return Growth(views, views[0].plan.divider, 1, False, carried, seconds, frame_seconds, smoothing)
 
 
 @dataclass(frozen=True, slots=True, eq=False)

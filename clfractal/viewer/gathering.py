@@ -42,7 +42,7 @@ class Gathering:
         """How far it is; `more`: seconds of a pass that is under way."""
         seconds = self.seconds + more
         smoothed = self._smoothing(finished)
-        return Growth(self.job.views, 1, self.samples, finished, seconds, frame_seconds, smoothed)
+        return Growth(self.job.views, 1, self.samples, finished, False, seconds, frame_seconds, smoothed)
 
     def _smoothing(self, finished: bool) -> tuple[float, ...]:
         """How strongly each view is smoothed: views that have all their samples are shown as files have them.

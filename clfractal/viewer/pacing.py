@@ -5,11 +5,15 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+from clfractal.engine.carry import RENDERED
+
 SHOWN_AFTER = (0.1, 0.25, 0.5, 1.0, 2.0)
 """Seconds after the start of a picture at rest when it is shown anew; later every two seconds."""
 
 _USUAL = 4e-7
 """Seconds a pixel takes, before anything is known."""
+_CARRYING = 2e-8
+"""Seconds in which a pixel is carried over from the picture before, before anything is known."""
 _SHOWING = 0.4
 """Part of a frame's time that is left for showing it, and for everything else."""
 
@@ -22,6 +26,7 @@ class Pacing:
         rate: frames a second that are wanted.
         coarsest: the largest divider that is allowed; 1: never coarse.
         seconds_per_pixel: that kernels took for the frames so far.
+        seconds_per_carried: that carrying a pixel over took.
         fixed: seconds of a frame that do not depend on its pixels.
     """
 
@@ -29,12 +34,24 @@ class Pacing:
     coarsest: int = 16
     seconds_per_pixel: float = _USUAL
     fixed: float = 0.003
+    seconds_per_carried: float = _CARRYING
 
-    def divider(self, pixels: int) -> int:
-        """Every how many pixels, in each direction, a moving picture of `pixels` pixels has a ray."""
+    def divider(self, pixels: int, *, carries: bool = False) -> int:
+        """Of how many pixels, in each direction, a moving picture of `pixels` pixels has one.
+
+        Args:
+            carries: whether only a part of these is rendered, and the others are carried over from the picture before.
+        """
         room = max((1 - _SHOWING) / self.rate - self.fixed, 0.2 / self.rate)
-        wanted = math.ceil(math.sqrt(max(pixels * self.seconds_per_pixel / room, 1e-9)))
+        each = self.seconds_per_pixel
+        if carries:
+            each = RENDERED * each + self.seconds_per_carried
+        wanted = math.ceil(math.sqrt(max(pixels * each / room, 1e-9)))
         return max(1, min(wanted, self.coarsest))
+
+    def learn_carrying(self, pixels: int, seconds: float) -> None:
+        """Takes note of what it took to carry a picture of so many pixels over, beside the kernels that rendered a part."""
+        self.seconds_per_carried += 0.3 * (seconds / max(pixels, 1) - self.seconds_per_carried)
 
     def learn(self, pixels: int, kernel: float, seconds: float) -> None:
         """Takes note of what a frame of so many rendered pixels took: the kernels, and all of it."""

@@ -2,17 +2,23 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
 from clfractal.engine.canvas import Canvas, CanvasKernels, CanvasStore
+from clfractal.engine.carry import Carrier, can_carry
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Progress, run
+from clfractal.errors import ClfractalError
 from clfractal.integrators.kept import Borrowing, Kept
+from clfractal.integrators.plan import PlannedView
 from clfractal.viewer.frame import CanvasPool, Frame
+from clfractal.viewer.pacing import Pacing
 
 BUDGET_SECONDS = 0.02
 """Limit of the work that is queued on the device: what cannot be told to end, ends after this time."""
@@ -57,6 +63,16 @@ class Executors:
             executor.close()
 
 
+@dataclass(frozen=True, slots=True)
+class Moved:
+    """A coarse or moving picture: its views, where it is, and the seconds that it took; `carried`: see `Growth`."""
+
+    views: tuple[PlannedView, ...]
+    canvas: Canvas
+    carried: bool
+    seconds: float
+
+
 class Painter:
     """Canvases of a device, and what draws on them.
 
@@ -68,6 +84,57 @@ class Painter:
     def __init__(self, device: Device, pool: CanvasPool, executor: LocalExecutor) -> None:
         self.device, self.pool, self.executor = device, pool, executor
         self._kernels: CanvasKernels | None = None
+        self._carrier: Carrier | None = None
+        self._foreseen = False
+
+    def foreseen(self, job: Job) -> CarryProgram | None:
+        """The task that gets ready what carries pixels over, once, for the first picture that can move so."""
+        if self._foreseen or not can_carry(job, job):
+            return None
+        self._foreseen = True
+        return CarryProgram(self)
+
+    def prepare(self, token: CancelToken) -> None:
+        """Builds what carries pixels over."""
+        self._carrier = Carrier(self.device, stopped=token)
+
+    def carries(self, front: Frame | None, job: Job) -> bool:
+        """Whether a job's picture can take pixels from the frame that is shown, because only the camera moved."""
+        if self._carrier is None or front is None or front.samples == 0:
+            return False
+        return front.canvas.stamp == front.stamp and can_carry(front.job, job)
+
+    def moved(
+        self,
+        job: Job,
+        divider: int,
+        front: Frame | None,
+        token: CancelToken,
+        pacing: Pacing,
+        *,
+        carries: bool,
+    ) -> Moved:
+        """A picture of so coarse pixels on a canvas, and what it took, which its pacing learns.
+
+        Args:
+            carries: see `carries`; then only a part of the pixels is rendered.
+        """
+        whole = job.coarse(divider)
+        carrier = self._carrier if carries else None
+        if carrier is None or front is None:
+            canvas = self.canvas(whole, front)
+            state = self.run(whole, canvas, token)
+            pixels, seconds, carrying = canvas.pixels, state.seconds, 0.0
+        else:
+            part = carrier.begin(job, divider)
+            state = self.run(part, carrier.fresh, token)
+            canvas = self.canvas(whole, front)
+            pixels, seconds, start = carrier.fresh.pixels, state.seconds, time.perf_counter()
+            carrier.carry(front.views, front.canvas, whole.views, canvas)
+            carrying = time.perf_counter() - start
+            pacing.learn_carrying(canvas.pixels, carrying)
+        pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
+        return Moved(whole.views, canvas, carrier is not None, seconds + carrying)
 
     def canvas(self, job: Job, front: Frame | None) -> Canvas:
         """A canvas for a job's views; not the one of the frame that is shown."""
@@ -118,3 +185,21 @@ class Painter:
         if self._kernels is None:
             self._kernels = CanvasKernels(self.device)
         return self._kernels
+
+
+class CarryProgram:
+    """Compiles what carries pixels over in the background, so that no move waits for it; see `Task`."""
+
+    finished = False
+
+    def __init__(self, painter: Painter) -> None:
+        self._painter = painter
+
+    def work(self, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]) -> None:
+        """See `Task`."""
+        self._painter.prepare(token)
+        self.finished = True
+
+    def failed(self, error: ClfractalError) -> None:
+        """Pictures move as coarse as they are without."""
+        self.finished = True

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from clfractal.device.cancel import CancelToken
+from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError, DeviceError, Stopped
 from clfractal.integrators.kept import Kept
 from clfractal.scene.model import Scene
@@ -113,6 +114,14 @@ def shows_whole(front: Frame | None, wanted: Wanted) -> bool:
         front is not None
         and not wanted.moving
         and front.divider == 1
+        and not front.carried
         and front.samples > 0
         and front.scene == wanted.scene
     )
+
+
+def stands(front: Frame | None, job: Job, wanted: Wanted) -> bool:
+    """Whether a picture that moved has come to rest: it is shown until the whole one takes its place."""
+    if front is None or not front.carried or wanted.moving or wanted.region is not None:
+        return False
+    return front.job.scene == job.scene

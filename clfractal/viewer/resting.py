@@ -13,6 +13,7 @@ from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.prepare import prepare
 from clfractal.engine.run import run
+from clfractal.errors import FileError
 from clfractal.files.channels import ALBEDO, NORMAL
 from clfractal.images.denoise import check_installed, denoised
 from clfractal.images.framebuffer import Framebuffer
@@ -22,6 +23,17 @@ from clfractal.scene.surface import SurfaceRenderer
 
 GUIDE_SAMPLES = 4
 """Samples of what surfaces reflect and of their normals, which the filter is told; it knows that they are noisy, too."""
+
+
+def cleaned(
+    scene: Scene, canvas: Canvas, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]
+) -> FileError | None:
+    """Takes the noise out of a picture as `clean` does; one that cannot be cleaned stays as it is, and this tells why."""
+    try:
+        clean(scene, canvas, executor, token, tell)
+    except FileError as error:
+        return error
+    return None
 
 
 def clean(

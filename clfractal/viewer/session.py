@@ -17,7 +17,7 @@ from clfractal.engine.job import Job
 from clfractal.engine.prepare import prepare
 from clfractal.engine.refine import has_room
 from clfractal.engine.run import Progress
-from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, FileError, NotReady, Stopped
+from clfractal.errors import STATUS_BAD_INPUT, ClfractalError, DeviceError, NotReady, Stopped
 from clfractal.integrators.kept import Borrowing, Kept
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import Task, do_some
@@ -35,8 +35,9 @@ from clfractal.viewer.preparing import (
     seen_from,
     sharp,
     shows_whole,
+    stands,
 )
-from clfractal.viewer.resting import clean
+from clfractal.viewer.resting import cleaned
 
 SETTLE_SECONDS = 0.15
 """A picture that moves is not refined before nothing has come for so long."""
@@ -354,12 +355,15 @@ class Session:
         pacing = self._drafts.pacing(shaded is not scene)
         job = self._prepared(sharp(shaded))
         pixels = sum(view.plan.region.pixels for view in job.views)
-        divider = pacing.divider(pixels)
+        carries = wanted.moving and self._painter.carries(self.frame, job)
+        divider = pacing.divider(pixels, carries=carries)
         seconds = 0.0
         # A part of a picture that is there is refined: the rest stays as it is.
         shown = shows_whole(self.frame, wanted)
-        if not shown and (divider > 1 or wanted.moving or wanted.region is not None):
-            seconds += self._coarse(wanted, job, divider, token, seconds, pacing)
+        if self.frame is not None and stands(self.frame, job, wanted):
+            divider = self.frame.divider
+        elif not shown and (divider > 1 or wanted.moving or wanted.region is not None):
+            seconds += self._coarse(wanted, job, divider, token, seconds, pacing, carries=carries)
         else:
             divider = 1
             self._executor.make_ready(job, token)
@@ -401,16 +405,21 @@ class Session:
         return self._preparation is not None and self._preparation.finished
 
     def _coarse(
-        self, wanted: Wanted, job: Job, divider: int, token: CancelToken, before: float, pacing: Pacing
+        self,
+        wanted: Wanted,
+        job: Job,
+        divider: int,
+        token: CancelToken,
+        before: float,
+        pacing: Pacing,
+        *,
+        carries: bool = False,
     ) -> float:
-        """Renders and publishes a coarse picture; gives the seconds that it took."""
-        coarse = job.coarse(divider)
-        canvas = self._painter.canvas(coarse, self.frame)
-        state = self._painter.run(coarse, canvas, token)
-        seconds = state.seconds
-        pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, seconds)
-        self._publish(wanted, job, canvas, Growth.coarse(coarse.views, divider, before + seconds, seconds))
-        return seconds
+        """Renders and publishes a coarse or moving picture; gives the seconds that it took."""
+        made = self._painter.moved(job, divider, self.frame, token, pacing, carries=carries)
+        growth = Growth.coarse(made.views, made.carried, before + made.seconds, made.seconds)
+        self._publish(wanted, job, made.canvas, growth)
+        return made.seconds
 
     def _gather(self, work: Gathering, token: CancelToken) -> None:
         """Samples of the whole picture, pass by pass, from where it stands."""
@@ -433,18 +442,10 @@ class Session:
                 raise Stopped
         self._executor.forget()
         if work.cleans:
-            self._clean(work, work.canvas, token)
+            problem = cleaned(work.job.scene, work.canvas, self._executors.aside, token, self._tell)
+            self._publish(work.wanted, work.job, work.canvas, work.growth(finished=True))
+            self.problem = problem
         work.finished = True
-
-    def _clean(self, work: Gathering, canvas: Canvas, token: CancelToken) -> None:
-        """Takes the noise out of the whole picture, as its scene wants; one that cannot be stays as it is."""
-        problem = None
-        try:
-            clean(work.job.scene, canvas, self._executors.aside, token, self._tell)
-        except FileError as error:
-            problem = error
-        self._publish(work.wanted, work.job, canvas, work.growth(finished=True))
-        self.problem = problem
 
     def _pass(self, work: Gathering, canvas: Canvas, token: CancelToken) -> None:
         """The next pass; one that was interrupted is done anew: pixels that have its samples already get no more."""
@@ -459,9 +460,11 @@ class Session:
         work.seconds += seconds
         work.samples, work.prepared = samples[1], True
         if samples[0] == 0:
-            foreseen = self._drafts.foreseen(work.wanted.scene, self._prepared)
-            if foreseen is not None:
-                self.add(foreseen)
+            carry = self._painter.foreseen(work.job)
+            draft = self._drafts.foreseen(work.wanted.scene, self._prepared)
+            for foreseen in (carry, draft):
+                if foreseen is not None:
+                    self.add(foreseen)
         if samples[1] == 1:
             pixels = sum(view.plan.region.pixels for view in part.views)
             self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)

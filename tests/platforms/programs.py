@@ -12,7 +12,7 @@ from clfractal.device import lane_probe as probe
 from clfractal.device import peak
 from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
-from clfractal.engine import canvas, show
+from clfractal.engine import canvas, carry, show
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.geometry.solids import Body
@@ -58,6 +58,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
         yield "peak", FlatText(peak.program_text(precision), SourceMap())
     if count == 1 and precision == "float32":
         yield "canvas", canvas.program_text()
+        yield "carry", carry.program_text()
         for to_image in (False, True):
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
