@@ -38,38 +38,41 @@ look before(__global const float4 *colors, __global const float *depths, __globa
     look none = {(float4)(0.0f), depth, 0, 0};
     float4 at = seen_in(c->there, c->perspective, x, y, depth), now = at;
     int column = 0, row = 0;
-    float right = 0.0f, below = 0.0f;
-    for (int i = 0; i < LOOKS; ++i) {
+    const float scale = smaller(c->finer, 1.0f);
+    int there = 0;
+    for (int i = 0; i < LOOKS && !there; ++i) {
+        if (c->perspective && !(at.z > 0.0f)) return none;   // it was behind the eye
         if (!(at.x > -0.5f && at.y > -0.5f && at.x < c->old_width - 0.5f && at.y < c->old_height - 0.5f)) return none;
         column = (int)(at.x + 0.5f);
         row = (int)(at.y + 0.5f);
         const float known = depths[(size_t)row * c->old_width + column];
         if (!(known < OUT_OF_SIGHT)) return none;
         now = seen_in(c->back, c->perspective, column, row, known);
-        right = x - now.x;
-        below = y - now.y;
+        const float right = x - now.x, below = y - now.y;
+        there = larger(size_of(right), size_of(below)) * scale < FOUND_WITHIN;
+        at.z = now.z;
         at.x = column + right * c->finer;
         at.y = row + below * c->finer;
     }
-    const float away = larger(size_of(right), size_of(below)) * smaller(c->finer, 1.0f);
-    if (!(away < FOUND_WITHIN) || now.z > farthest) return none;
-    // Between four pixels of one surface.
+    if (!there || (c->perspective && !(now.z > 0.0f)) || now.z > farthest) return none;
+    // Between four pixels, as far as they are of the same surface.
+    const size_t own = (size_t)row * c->old_width + column;
     const int left = (int)(at.x + 1.0f) - 1, top = (int)(at.y + 1.0f) - 1;
-    const float own = depths[(size_t)row * c->old_width + column], near = c->step * (c->perspective ? own : 1.0f);
-    look all = {(float4)(0.0f), now.z, 0, 1};
-    float sum = 0.0f;
-    for (int i = 0; i < 4; ++i) {
-        const int u = within(left + (i & 1), c->old_width), v = within(top + (i >> 1), c->old_height);
-        const size_t place = (size_t)v * c->old_width + u;
-        float share = (1.0f - size_of(at.x - left - (i & 1))) * (1.0f - size_of(at.y - top - (i >> 1)));
-        if (!(size_of(depths[place] - own) <= near)) share = u == column && v == row ? share + 0.01f : 0.0f;
-        if (share <= 0.0f) continue;
-        all.color += share * colors[place];
-        sum += share;
+    const int u = within(left, c->old_width), v = within(left + 1, c->old_width);
+    const size_t above = (size_t)within(top, c->old_height) * c->old_width;
+    const size_t under = (size_t)within(top + 1, c->old_height) * c->old_width;
+    const float across = at.x - left, down = at.y - top, depth_here = depths[own];
+    const float near = c->step * (c->perspective ? depth_here : 1.0f);
+#define SHARE(place, share) (size_of(depths[place] - depth_here) <= near ? (share) : 0.0f)
+    const float first = SHARE(above + u, (1.0f - across) * (1.0f - down)), second = SHARE(above + v, across * (1.0f - down));
+    const float third = SHARE(under + u, (1.0f - across) * down), fourth = SHARE(under + v, across * down);
+    const float sum = first + second + third + fourth;
+    look all = {colors[own], now.z, 1 + (c->old_is_carried ? ages[own] : 0), 0};
+    if (sum > 0.0f) {
+        all.color = (first * colors[above + u] + second * colors[above + v] + third * colors[under + u] + fourth * colors[under + v]) *
+                    (1.0f / sum);
     }
-    all.color /= sum;
-    all.age = 1 + (c->old_is_carried ? ages[(size_t)row * c->old_width + column] : 0);
-    all.found = sum > 0.0f && all.age <= c->oldest;
+    all.found = all.age <= c->oldest;
     return all;
 }
 
@@ -85,7 +88,7 @@ __kernel void carry(__global const float4 *fresh_colors, __global const float *f
     const int column = (x - c->phase_x) >> 1, row = (y - c->phase_y) >> 1;
     const int is_right = (x - c->phase_x) & 1, is_below = (y - c->phase_y) & 1;
     size_t around[4];
-    float nearest = INFINITY, farthest = 0.0f;
+    float nearest = INFINITY, farthest = -OUT_OF_SIGHT;
     int open = 0;
     for (int i = 0; i < 4; ++i) {
         const int u = within(column + (i & is_right), c->fresh_width), v = within(row + ((i >> 1) & is_below), c->fresh_height);
