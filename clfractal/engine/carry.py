@@ -1,4 +1,4 @@
-"""Pictures of a camera that moves: a part is rendered, and the rest is carried over from the picture before."""
+"""Pictures of a camera that moves: a part is rendered, the rest is carried over from the picture before."""
 
 from __future__ import annotations
 
