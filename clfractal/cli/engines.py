@@ -22,6 +22,9 @@ def engine_of(order: Order, shell: Shell) -> Iterator[AnyEngine]:
         ClfractalError: there is no such device or cluster.
     """
     if order.cluster is None:
+        from clfractal.device import ahead
+
+        ahead.begin()  # while the next line loads what renders
         from clfractal.engine.engine import Engine
 
         yield Engine(order.device, tell=shell.say)

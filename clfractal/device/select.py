@@ -18,7 +18,7 @@ from typing import Any, Literal
 
 import pyopencl as cl
 
-from clfractal.device import bundled, cache, drivers_folder
+from clfractal.device import ahead, bundled, cache, drivers_folder
 from clfractal.device.advice import install_hint
 from clfractal.device.driver_errors import error_code, is_out_of_memory
 from clfractal.device.forked import use_opencl
@@ -361,6 +361,7 @@ def _found() -> list[Device]:
 @cache_of_calls
 def _find() -> list[Device]:
     """Once for a process: the devices whose contexts are shared by all who ask for no context of their own."""
+    ahead.wait()
     bundled.offer()
     with drivers_folder.given_to_drivers():
         return _look()
