@@ -92,9 +92,12 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
         "import sys; from clfractal.cli import run; from clfractal.cli.shell import Shell\n"
         f"order = ['render', {str(scene)!r}, '--size', '16x16', '-o', {str(tmp_path / 'picture.png')!r}]\n"
         "assert run(order, Shell(owns_process=False)) == 0\n"
-        "print(*sys.modules)"
+        "print(*sys.modules)\n"
+        "from clfractal.scene.materials import PbrMaterial; print(PbrMaterial.__pydantic_complete__)"
     )
-    loaded = set(works(python(code)).out.splitlines()[-1].split())
+    *_, modules, has_validators_of_paths = works(python(code)).out.splitlines()
+    assert has_validators_of_paths == "False"
+    loaded = set(modules.split())
     assert "clfractal.integrators.surface" in loaded
     own = {
         *("clfractal.device.buildlog", "clfractal.images.anaglyph", "clfractal.images.probe"),

@@ -102,6 +102,8 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
     Args:
         grids_begin: the number of the tables at which the volumes' grids begin.
     """
+    if not scene.objects:
+        return np.zeros(1, OBJECT.dtype(precision))
     grids = ObjectGrids(scene)
     numbers = MappedMaterials(scene).blends.roots[1:]
     glass = glass_bodies(scene)[1:]
@@ -123,7 +125,7 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
     for row, name in zip(rows, scene.objects, strict=True):
         if name in scene.joined:  # the march finds it, and one body of glass is all of the set
             row |= {"kind": OBJECT_KINDS["joined"], "glass": 0}
-    return OBJECT.array(precision, rows) if rows else np.zeros(1, OBJECT.dtype(precision))
+    return OBJECT.array(precision, rows)
 
 
 def _sampled(radiance: Vector | None) -> dict[str, object]:

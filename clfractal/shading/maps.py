@@ -247,8 +247,9 @@ def has_glass_set(scene: Scene) -> bool:
 
 def has_participating_media(scene: Scene) -> bool:
     """Whether anything that paths go through scatters light on the way."""
-    participating = any(is_participating(each, scene.materials) for each in used_materials(scene))
-    return has_subsurface(scene) or (has_glass(scene) and participating)
+    return has_subsurface(scene) or (
+        has_glass(scene) and any(is_participating(each, scene.materials) for each in used_materials(scene))
+    )
 
 
 def has_costly(scene: Scene) -> bool:
