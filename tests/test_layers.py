@@ -155,14 +155,17 @@ def test_the_program_starts_without_what_it_does_not_need(monkeypatch: pytest.Mo
         assert python(code, extra=given).out.split() == ["False", used]
 
 
-def test_garbage_is_collected_again_while_a_command_works(tmp_path: Path) -> None:
+def test_garbage_is_collected_again_once_a_command_has_loaded_what_it_needs() -> None:
     code = (
-        "import gc; gc.disable()\n"
+        "import gc, time; gc.disable()\n"
         "from clfractal.cli import check, program; from clfractal.cli.shell import Shell\n"
-        "check.check_scene = lambda *_, **__: print(gc.isenabled(), gc.get_freeze_count() > 0)\n"
+        "def work(*_, **__):\n"
+        "    print(gc.isenabled(), gc.get_freeze_count() > 0)\n"
+        "    while not gc.isenabled(): time.sleep(0.01)\n"
+        "check.check_scene, program.LOADED_AFTER_SECONDS = work, 0.5\n"
         "program.call(['check', 'scene.yaml'], Shell(owns_process=False))"
     )
-    assert works(python(code)).out.split() == ["True", "True"]
+    assert works(python(code)).out.split() == ["False", "True"]
 
 
 def test_importing_the_package_imports_nothing_else() -> None:

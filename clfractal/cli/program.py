@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import threading
 from collections.abc import Sequence
 from copy import copy
 from typing import Annotated
@@ -42,6 +43,8 @@ _ORDER = (
     "schema",
 )
 
+LOADED_AFTER_SECONDS = 2.0
+
 
 def _name_of(command: CommandInfo) -> str:
     return str(command.name or getattr(command.callback, "__name__", ""))
@@ -79,9 +82,12 @@ def call(arguments: Sequence[str], shell: Shell) -> int:
         raise KeyboardInterrupt
     if callable(work):
         if not gc.isenabled():
-            # What the start has made stays until the end, so it is no garbage: from now on only newer objects are searched.
+            # What the start has made stays until the end, so it is no garbage: only newer objects are searched, and these
+            # from when the command has loaded what it needs.
             gc.freeze()
-            gc.enable()
+            later = threading.Timer(LOADED_AFTER_SECONDS, gc.enable)
+            later.daemon = True
+            later.start()
         shell.mute_drivers()
         with Patience(shell):
             work()
