@@ -50,6 +50,9 @@ INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world 
     queue_send(s.q, turn, s.slot, r, wanted);
 }
 
+// Where the weight of what a ray brings is kept, beside the ray.
+INLINE __global scalar *ray_strength(stage s, int turn) { return s.q.rays + RAY_STRENGTH * s.q.stride + turn * s.q.wave + s.slot; }
+
 // What has to be known of a ray: which surface it meets, or only whether it meets one.
 #define WHICH R(0.0)
 #define WHETHER ((real)(REAL_LARGEST))

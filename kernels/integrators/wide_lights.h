@@ -42,11 +42,6 @@ INLINE incidence ambient_ray(stage s, const packet_pixels *at, const interaction
     return in;
 }
 
-// Where the weight of what a ray brings is kept, beside the ray.
-INLINE __global scalar *ambient_strength(stage s, int turn) {
-    return s.q.rays + RAY_STRENGTH * s.q.stride + turn * s.q.wave + s.slot;
-}
-
 // The light that the ray brings from the environment to a surface that scatters the part `diffuse` of it; the ray also counts towards the open part of the hemisphere.
 INLINE color ambient_light(stage s, const interaction *here, int turn, ray_hit met, real diffuse, world w, real *open) {
     if (turn < w.settings->cosine_rays) {
@@ -54,7 +49,7 @@ INLINE color ambient_light(stage s, const interaction *here, int turn, ray_hit m
         *open += pick(near, R(0.0), (real)(w.settings->occlusion_share));
     }
     if (!has_environment(w.material)) return color_of(R(0.0), R(0.0), R(0.0));
-    const real strength = lanes_load(ambient_strength(s, turn));
+    const real strength = lanes_load(ray_strength(s, turn));
     const color bright = environment_color(queue_ray(s.q, turn, s.slot).direction, w.material, w.environment);
     const real share = pick(mask_of(met.hit), R(0.0), strength * diffuse);
     return color_of(bright.r * here->tint.r * share, bright.g * here->tint.g * share, bright.b * here->tint.b * share);
@@ -106,7 +101,7 @@ INLINE void send_to_wide_lights(stage s, const packet_pixels *at, const interact
         // How near an obstacle is matters for the open part of the hemisphere.
         const int measured = turn < w.settings->cosine_rays && w.settings->occlusion_share > S(0.0);
         send_to_light(s, turn, here, in, measured ? (real)(w.settings->occlusion_distance) : WHETHER, wanted, w);
-        if (turn < hemisphere_turns(w) && has_environment(w.material)) lanes_store(in.strength, ambient_strength(s, turn));
+        if (turn < hemisphere_turns(w) && has_environment(w.material)) lanes_store(in.strength, ray_strength(s, turn));
     }
 }
 

@@ -18,11 +18,11 @@ INLINE real fog_way(vec origin, vec direction, real depth, material_record m) {
     return pick(level, even * (R(1.0) + c * (R(0.5) + c * (R(0.33333333) + c * R(0.25)))), curved);
 }
 
-// A place that scatters light, the ray from there to the light, and what it brings to the eye.
+// A place that scatters light, the ray from there to the light, and which part of its light comes to the eye.
 typedef struct {
     real t;
     incidence in;
-    color light;
+    real share;
 } scattering;
 
 // The place of a light's sample on the way of a ray of length `far`: by what comes through where the light is as strong everywhere, and
@@ -47,7 +47,7 @@ INLINE real scattering_place(ray r, real far, real u, light_record light, materi
     return t;
 }
 
-// What the fog sends to the eye of a light, if nothing is between.
+// Where the fog scatters a light to the eye, if nothing is between.
 INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, int light_index, world w) {
     light_record light = w.lights + light_index;
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, (uint)(PURPOSE_AIR + 16 * (1 + light_index)));
@@ -62,9 +62,8 @@ INLINE scattering scattered(stage s, const packet_pixels *at, ray r, real far, i
         found.in.toward = cone_direction(found.in.toward, (real)(light->spread), other, v);
     }
     // A light of intensity 1 is an irradiance of pi.
-    const real share = R(3.141592653589793) * found.in.strength * weight
-                       * phase_of(vec_dot(found.in.toward, r.direction), (real)(w.material->fog_anisotropy));
-    found.light = color_mul(color_splat(w.material->fog_scattering), color_scale(color_splat(light->color), share));
+    found.share = R(3.141592653589793) * found.in.strength * weight
+                  * phase_of(vec_dot(found.in.toward, r.direction), (real)(w.material->fog_anisotropy));
     return found;
 }
 

@@ -23,7 +23,7 @@ NUMBERS_PICKED(ray_hit)
 #define RAY_FAR 7
 #define RAY_SENT (NUMBERS_OF(ray) - 1)
 #define RAY_KNOWN RAY_SENT   // only where pixels have points
-// Beside a ray stands one number more: of a ray of ambient light the weight of what it brings; of one that looks for a surface
+// Beside a ray stands one number more: of a ray of ambient light or from fog the weight of what it brings; of one that looks for a surface
 // where it began before a cone took it farther.
 #define RAY_STRENGTH NUMBERS_OF(ray)
 #define RAY_START NUMBERS_OF(ray)
