@@ -26,7 +26,7 @@ class PathLighting(Section):
         8, ge=0, le=MAX_BOUNCES, description="most bounces of a path after the first surface"
     )
     roulette: Annotated[int, Usual(0, 16)] = Field(
-        3,
+        1,
         ge=0,
         le=MAX_BOUNCES,
         description="bounces after which paths that carry little light end by chance; the mean stays the same",
