@@ -46,6 +46,7 @@ typedef int mask;
 #define to_reals(a) ((real)(a))
 #define lanes_store(value, array) ((array)[0] = (value))
 #define lanes_load(array) ((array)[0])
+#define going_on(m) (~0)
 #else
 typedef OF_LANES(INTEGER) mask;
 // PoCL's `any` tests lane after lane; a reduction becomes one or two instructions.
@@ -87,6 +88,8 @@ INLINE real direct_pick(mask m, real yes, real no) {
 #define to_reals(a) CONVERT(OF_LANES(SCALAR), a)
 #define lanes_store(value, array) JOIN(vstore, LANES)(value, 0, array)
 #define lanes_load(array) JOIN(vload, LANES)(0, array)
+// Which lanes go on within a loop that ends when none does: of a single lane no compiler has to ask.
+#define going_on(m) (m)
 #endif
 // The bits of numbers as whole ones, and back.
 #define as_whole(a) JOIN(as_, OF_LANES(INTEGER))(a)

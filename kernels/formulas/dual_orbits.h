@@ -20,7 +20,7 @@ INLINE void dual_orbit_begin(dual_orbit *o, dual_state *c, vec point, mask activ
 
 INLINE void dual_orbit_apply(int usual, dual_orbit *o, int n, dual_state c, orbit_record orbit, constants k) {
     const dual_state next = dual_apply_by(usual, n, o->z, c, k);
-    const mask alive = o->lanes.alive;
+    const mask alive = going_on(o->lanes.alive);
     o->z = dual_state_pick(alive, next, o->z);
     o->square_before = pick(alive, o->lanes.square, o->square_before);
     lanes_applied(&o->lanes, dual_state_square(next), orbit);
@@ -32,7 +32,7 @@ INLINE void dual_orbit_apply(int usual, dual_orbit *o, int n, dual_state c, orbi
 INLINE void dual_orbit_run(int usual, dual_orbit *o, dual_state c, mask active, int of, int carries, mask *left, vec *at_limit,
                            orbit_record orbit, constants k) {
     const uint begun = lanes_bits(active);
-    for (int n = FIRST_COUNT;; ++n) {
+    for (int n = FIRST_COUNT; IS_WITHIN_LONGEST(n, orbit); ++n) {
         const int looks = of == OF_SURFACE && o->lanes.look == 0;
         const int goes_on = lanes_go_on(&o->lanes, begun, carries, orbit);
         if (looks) {

@@ -41,11 +41,12 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
             const int end = min(n + PERIOD_CHECK, limit);
             for (; n < end; ++n) {
                 if (!any_lane(alive)) break;
-                z = state_pick(alive, apply_by(usual, n, z, c, k), z);
-                if (!LOGARITHMIC) square_before = pick(alive, square, square_before);
+                const mask applied = going_on(alive);
+                z = state_pick(applied, apply_by(usual, n, z, c, k), z);
+                if (!LOGARITHMIC) square_before = pick(applied, square, square_before);
                 square = state_square(z);
-                count += pick(alive, R(1.0), R(0.0));
-                alive &= less_equal(square, radius_square);
+                count += pick(applied, R(1.0), R(0.0));
+                alive = applied & less_equal(square, radius_square);
                 if (!HAS_SHAPE && smooth) highest = fmax(highest, square);
             }
             if (!HAS_SHAPE && periodicity) {

@@ -42,19 +42,20 @@ INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, con
 #endif
         alive &= ~near;
         if (!any_lane(alive)) break;
+        const mask applied = going_on(alive);
 #if HAS_DERIVATIVE
         real next_growth = growth;
         const state next = apply_derivative(n, z, c, &next_growth, k);
-        z = state_pick(alive, next, z);
-        growth = pick(alive, next_growth, growth);
-        square = pick(alive, state_square(next), square);
+        z = state_pick(applied, next, z);
+        growth = pick(applied, next_growth, growth);
+        square = pick(applied, state_square(next), square);
 #else
         const dual_state next = dual_apply(n, z, c, k);
-        z = dual_state_pick(alive, next, z);
-        square = pick(alive, dual_state_square(next), square);
+        z = dual_state_pick(applied, next, z);
+        square = pick(applied, dual_state_square(next), square);
 #endif
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(square, (real)(orbit->distance_square));
+        count = pick(applied, (real)((scalar)(n + 1)), count);
+        alive = applied & less_equal(square, (real)(orbit->distance_square));
     }
     if (orbit->longest <= orbit->iterations) near |= alive & in_set(square, orbit);
 #if !HAS_DERIVATIVE

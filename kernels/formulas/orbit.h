@@ -51,10 +51,11 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, orbit_record o
             look += ORBIT_LOOK;
         }
         const state next = apply(n, z, c, k);
-        z = state_pick(alive, next, z);
-        square = pick(alive, state_square(next), square);
-        count -= alive;  // true is -1
-        alive &= less_equal(square, (real)(orbit->bailout_square));
+        const mask applied = going_on(alive);
+        z = state_pick(applied, next, z);
+        square = pick(applied, state_square(next), square);
+        count -= applied;  // true is -1
+        alive = applied & less_equal(square, (real)(orbit->bailout_square));
     }
     return (orbit_counted){count, alive};
 }
@@ -79,10 +80,11 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_reco
             look += ORBIT_LOOK;
         }
         const state next = apply_by(usual, n, z, c, k);
-        z = state_pick(alive, next, z);
-        square = pick(alive, state_square(next), square);
-        count = pick(alive, (real)((scalar)(n + 1)), count);
-        alive &= less_equal(square, (real)(orbit->distance_square));
+        const mask applied = going_on(alive);
+        z = state_pick(applied, next, z);
+        square = pick(applied, state_square(next), square);
+        count = pick(applied, (real)((scalar)(n + 1)), count);
+        alive = applied & less_equal(square, (real)(orbit->distance_square));
     }
     alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & in_set(square, orbit);
     return (orbit_end){count, alive};

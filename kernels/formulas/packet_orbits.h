@@ -17,6 +17,10 @@ typedef struct {
 #define CARRIES (!JOINED && CARRIES_ORBITS && LANES >= 8)
 #define CARRIED_MOST (LANES / 8)
 
+// Whether orbits of `n` applications may go on. They end by their limits; with a bound that compilers see they keep the z of a single
+// lane once (of duals on AMD's GPUs: 49 registers in the place of 61).
+#define IS_WITHIN_LONGEST(n, orbit) (LANES > 1 || (n) <= (orbit)->longest)
+
 INLINE void orbit_lanes_begin(orbit_lanes *o, real square, mask late, mask active, orbit_record orbit) {
     const mask fresh = active & ~late;
     o->square = pick(late, o->square, square);
@@ -28,9 +32,10 @@ INLINE void orbit_lanes_begin(orbit_lanes *o, real square, mask late, mask activ
 }
 
 INLINE void lanes_applied(orbit_lanes *o, real square, orbit_record orbit) {
-    o->square = pick(o->alive, square, o->square);
-    o->count -= o->alive;  // true is -1
-    o->alive &= less_equal(o->square, (real)(orbit->distance_square));
+    const mask alive = going_on(o->alive);
+    o->square = pick(alive, square, o->square);
+    o->count -= alive;  // true is -1
+    o->alive = alive & less_equal(o->square, (real)(orbit->distance_square));
 }
 
 // Looks at the limits, and says when to look again. An orbit that is within the bailout at `iterations` is inside; others go on for a
@@ -40,6 +45,10 @@ INLINE void lanes_look(orbit_lanes *o, orbit_record orbit) {
     o->inside |= o->alive & equal_ints(o->count, limit) & in_set(o->square, orbit);
     o->alive &= ~(o->inside | equal_ints(o->count, longest));
     if (orbit_cancelled(orbit)) o->alive &= ~o->alive;
+#if LANES == 1
+    const int next = o->count < limit ? limit : longest;
+    o->look = min(next - o->count, ORBIT_LOOK);
+#else
     scalar left[LANES];
     lanes_store(to_reals(limit - o->count), left);
     int look = ORBIT_LOOK;
@@ -50,6 +59,7 @@ INLINE void lanes_look(orbit_lanes *o, orbit_record orbit) {
         if (here < (scalar)look) look = (int)here;
     }
     o->look = look;
+#endif
 }
 
 // Whether a packet is applied once more. With `carries` it need not be where only a few lanes are left, and others have ended since

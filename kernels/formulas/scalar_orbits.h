@@ -19,8 +19,9 @@ INLINE void scalar_orbit_begin(scalar_orbit *o, state *c, vec point, mask active
 INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, state c, orbit_record orbit, constants k) {
     real growth = o->growth;
     const state next = apply_derivative_by(usual, n, o->z, c, &growth, k);
-    o->z = state_pick(o->lanes.alive, next, o->z);
-    o->growth = pick(o->lanes.alive, growth, o->growth);
+    const mask alive = going_on(o->lanes.alive);
+    o->z = state_pick(alive, next, o->z);
+    o->growth = pick(alive, growth, o->growth);
     lanes_applied(&o->lanes, state_square(next), orbit);
 }
 
@@ -45,7 +46,9 @@ INLINE clearance scalar_orbit_by(int usual, scalar_orbit *o, vec point, mask act
     const uint begun = lanes_bits(active);
     state c;
     scalar_orbit_begin(o, &c, point, active, *late, orbit, k);
-    for (int n = FIRST_COUNT; lanes_go_on(&o->lanes, begun, carries, orbit); ++n) scalar_orbit_apply(usual, o, n, c, orbit, k);
+    for (int n = FIRST_COUNT; IS_WITHIN_LONGEST(n, orbit) && lanes_go_on(&o->lanes, begun, carries, orbit); ++n) {
+        scalar_orbit_apply(usual, o, n, c, orbit, k);
+    }
     *late = o->lanes.alive;
     return scalar_orbit_end(o, active, orbit, k);
 }

@@ -26,9 +26,10 @@ INLINE real formula_near(trap near, vec point, mask active, orbit_record orbit, 
     for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
         const state next = apply(n, z, c, k);
-        z = state_pick(alive, next, z);
-        nearest = pick(alive, fmin(nearest, trap_distance(near, next)), nearest);
-        alive &= less_equal(state_square(z), (real)(orbit->bailout_square));
+        const mask applied = going_on(alive);
+        z = state_pick(applied, next, z);
+        nearest = pick(applied, fmin(nearest, trap_distance(near, next)), nearest);
+        alive = applied & less_equal(state_square(z), (real)(orbit->bailout_square));
     }
     return pick(less(nearest, (real)(REAL_LARGEST)), nearest, at_start);
 }
