@@ -8,6 +8,8 @@
 #define OUT_OF_SIGHT 1e30f   // farther than this nothing is known but that nothing is there
 #define FOUND_WITHIN 0.55f   // pixels, of the coarser picture
 #define LOOKS 3
+#define SPREAD 1.0f   // times the rendered colours' range, and
+#define SPARE 0.15f   // times the lightest of them
 
 // A pixel of one picture in the other: its place in pixels, and its depth.
 float4 seen_in(__constant const float *rows, int perspective, float x, float y, float depth) {
@@ -76,6 +78,21 @@ look before(__global const float4 *colors, __global const float *depths, __globa
     return all;
 }
 
+// A colour near those of the rendered pixels around: highlights move with the eye, and not with what they lie on.
+float4 near_to(float4 color, __global const float4 *colors, const size_t *around) {
+    float4 lowest = colors[around[0]], highest = lowest;
+    for (int i = 1; i < 4; ++i) {
+        const float4 other = colors[around[i]];
+        lowest = other < lowest ? other : lowest;
+        highest = other > highest ? other : highest;
+    }
+    const float4 more = SPREAD * (highest - lowest) + SPARE * highest;
+    lowest -= more;
+    highest += more;
+    color = color < lowest ? lowest : color;
+    return color > highest ? highest : color;
+}
+
 __kernel void carry(__global const float4 *fresh_colors, __global const float *fresh_depths, __global const float4 *old_colors,
                     __global const float *old_depths, __global const uchar *old_ages, __global float4 *colors, __global float *depths,
                     __global uchar *ages, __constant const struct Carry *c) {
@@ -114,7 +131,9 @@ __kernel void carry(__global const float4 *fresh_colors, __global const float *f
         if (!seen.found && farthest > nearest + near) {
             seen = before(old_colors + c->old_offset, old_depths + c->old_offset, old_ages + c->old_offset, c, x, y, farthest, last);
         }
-        if (!seen.found) {
+        if (seen.found) {
+            seen.color = near_to(seen.color, fresh_colors, around);
+        } else {
             // What came into sight may be on either side of an edge: it is drawn softly, and is not carried on from there.
             seen.color = (float4)(0.0f);
             for (int i = 0; i < 4; ++i) seen.color += 0.25f * fresh_colors[around[i]];
