@@ -56,7 +56,7 @@ def lit(
     values: dict[str, Any] = {
         "lights": [],
         "background": BLACK,
-        "lighting": {"mode": "path", "bounces": bounces},
+        "lighting": {"mode": "path", "bounces": bounces, "roulette": bounces},  # less noise
         "materials": MATERIALS,
         "objects": {"floor": FLOOR, **objects},
         "renderer": {"samples": samples, "detail": 0.1},
