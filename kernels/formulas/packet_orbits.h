@@ -15,7 +15,7 @@ typedef struct {
 
 // Whether marches leave orbits under way (Facts.carries_orbits): not where turns of several formulas are one count for all lanes.
 #define CARRIES (!JOINED && CARRIES_ORBITS && LANES >= 8)
-#define CARRIED_MOST (LANES / 8)
+#define CARRIED (CARRIES ? LANES / 8 : 0)  // lanes of a march's packet that may be left
 
 // Whether orbits of `n` applications may go on. They end by their limits; with a bound that compilers see they keep the z of a single
 // lane once (of duals on AMD's GPUs: 49 registers in the place of 61).
@@ -62,8 +62,8 @@ INLINE void lanes_look(orbit_lanes *o, orbit_record orbit) {
 #endif
 }
 
-// Whether a packet is applied once more. With `carries` it need not be where only a few lanes are left, and others have ended since
-// `begun` ones began.
+// Whether a packet is applied once more. It need not be where at most `carries` lanes are left, and others have ended since `begun` ones
+// began.
 INLINE int lanes_go_on(orbit_lanes *o, uint begun, int carries, orbit_record orbit) {
     if (o->look-- == 0) {
         lanes_look(o, orbit);
@@ -71,7 +71,7 @@ INLINE int lanes_go_on(orbit_lanes *o, uint begun, int carries, orbit_record orb
     }
     if (!carries) return any_lane(o->alive);
     const uint alive = lanes_bits(o->alive);
-    const int left = bits_count(alive), goes_on = left > CARRIED_MOST || (alive == begun && left != 0);
+    const int left = bits_count(alive), goes_on = left > carries || (alive == begun && left != 0);
     if (goes_on) o->waits += bits_count(begun) - left;
     return goes_on;
 }

@@ -120,10 +120,11 @@ INLINE clearance orbit_behind(vec point, mask active, orbit_record orbit, consta
 INLINE clearance orbit_step(march_orbit *under_way, vec point, mask active, mask *late, orbit_record orbit, constants k,
                             surface_point *surface) {
 #if HAS_DERIVATIVE
-    if (!JOINED) return formula_scalar_orbit(under_way, point, active, late, CARRIES, orbit, k);
+    if (!JOINED) return formula_scalar_orbit(under_way, point, active, late, CARRIED, orbit, k);
     return solids_distance(&point, active, ASK_STEP, orbit, k, surface);
 #else
-    if (!JOINED) return formula_dual_orbit(under_way, point, active, late, OF_DISTANCE, CARRIES, orbit, k, surface);
+    dual_limit none = dual_limit_none(active);
+    if (!JOINED) return formula_dual_orbit(under_way, point, active, late, OF_DISTANCE, CARRIED, &none, orbit, k, surface);
     return solids_distance(&point, active, ASK_GRADIENT, orbit, k, surface);
 #endif
 }
@@ -133,7 +134,7 @@ INLINE clearance orbit_step(march_orbit *under_way, vec point, mask active, mask
 INLINE void orbit_steps(march_orbit *a, march_orbit *b, const vec *points, const mask *active, mask *late, clearance *found,
                         orbit_record orbit, constants k) {
     if (!JOINED) {
-        formula_scalar_orbits(a, b, points, active, late, CARRIES, found, orbit, k);
+        formula_scalar_orbits(a, b, points, active, late, CARRIED, found, orbit, k);
         return;
     }
     surface_point ignored;

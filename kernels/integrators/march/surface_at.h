@@ -1,6 +1,8 @@
 // Light is computed where the ray's cone came near the solid: most of these surfaces are rougher than a pixel, and there the
 // distance has smoothed them over the pixel's footprint. Where the surface is smooth, light is computed at the hit. It is smooth
 // where the gradient at the hit is the one straight above it too. (Before the hit, on the ray, it is that of a place beside it.)
+#include "formulas/gathered_orbits.h"
+
 #define LIKE R(0.04)      // radians between these gradients: up to this far apart they are alike ...
 #define UNLIKE R(0.08)    // ... and from here on they are not
 #define PLACED R(0.01)    // below this, shadows begin at the hit too ...
@@ -42,42 +44,66 @@ INLINE void surface_of_walls(ray r, ray_hit *met, mask walls, march_record setti
     *normal = vec_pick(walls, vec_normalize(*normal), *normal);
 }
 
+// A surface where marches have ended, while the formula is asked for it: up to three times, each time at another `place`.
+typedef struct {
+    mask asked;
+    vec place;
+    clearance there;         // what was found where it is seen, before it
+    surface_point surface;
+    vec wide, at_hit;        // the gradient there, and that at the hit
+    vec normal;
+} lit;
+
+INLINE void lit_begin(lit *l, ray r, const ray_hit *met, mask active) {
+    l->asked = active;
+    l->place = vec_along(r.origin, met->touch, r.direction);
+}
+
+// What has been found there tells where it is asked next, `turn` by turn.
+INLINE void lit_found(lit *l, int turn, clearance here, surface_point found, ray r, ray_hit *met, march_record settings) {
+    met->more_count += pick(l->asked, here.end.count, R(0.0));
+    const vec gradient = vec_normalize(found.gradient);
+    if (turn == 0) {
+        l->there = here;
+        l->surface = found;
+        l->wide = l->normal = gradient;
+        l->asked &= ~is_blind(here);
+        // The search by steps has no place before the hit.
+        l->asked &= less(met->touch, met->last) | less(met->touch, met->t);
+        l->place = vec_along(r.origin, met->last, r.direction);
+    } else if (turn == 1) {
+        const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
+        const real way = most(R(0.01) * cone, met->last - met->touch);
+        l->at_hit = vec_normalize(vec_along(gradient, (met->t - met->last) / way, vec_sub(gradient, l->wide)));
+        l->asked &= less(R(0.0), share_below(vec_sub(l->at_hit, l->wide), BESIDE, ASTRAY));
+        const real height = (met->touch - met->t) * vec_dot(l->wide, r.direction);
+        l->place = vec_along(vec_along(r.origin, met->t, r.direction), most(R(0.0), height), l->wide);
+    } else {
+        l->asked &= ~here.end.inside & less(R(0.5), vec_dot(gradient, gradient));
+        const vec apart = vec_sub(gradient, l->at_hit), turned = vec_sub(l->at_hit, l->wide);
+        const real share = share_below(apart, LIKE, UNLIKE) * share_below(turned, BESIDE, ASTRAY);
+        l->normal = vec_pick(l->asked, vec_normalize(vec_along(l->wide, share, turned)), l->wide);
+        met->touch += pick(l->asked, share_below(apart, PLACED, UNPLACED) * (met->t - met->touch), R(0.0));
+    }
+}
+
+// How often the formula is asked for each surface.
+INLINE int lit_turns(march_record settings) { return settings->lands ? 3 : 1; }
+
 // The surface where a march has ended: how far it is before it, at `touch`, and its normal, which may be that at the hit.
 INLINE surface_point surface_lit(ray r, ray_hit *met, mask active, march_record settings,
                                  orbit_record orbit, constants k, clearance *there, vec *normal) {
-    const real cone = (real)(settings->detail) * (r.footprint + r.spread * met->t);
-    surface_point surface, found;
-    vec wide, at_hit, place = vec_along(r.origin, met->touch, r.direction);
-    mask asked = active;
+    lit l;
+    lit_begin(&l, r, met, active);
     for (int i = 0; i < TURNS(3); ++i) {
-        if (!any_lane(asked)) break;
-        const clearance here = orbit_dual_distance(place, asked, OF_SURFACE, orbit, k, &found);
-        met->more_count += pick(asked, here.end.count, R(0.0));
-        const vec gradient = vec_normalize(found.gradient);
-        if (i == 0) {
-            *there = here;
-            surface = found;
-            wide = *normal = gradient;
-            if (!settings->lands) break;
-            asked &= ~is_blind(here);
-            // The search by steps has no place before the hit.
-            asked &= less(met->touch, met->last) | less(met->touch, met->t);
-            place = vec_along(r.origin, met->last, r.direction);
-        } else if (i == 1) {
-            const real way = most(R(0.01) * cone, met->last - met->touch);
-            at_hit = vec_normalize(vec_along(gradient, (met->t - met->last) / way, vec_sub(gradient, wide)));
-            asked &= less(R(0.0), share_below(vec_sub(at_hit, wide), BESIDE, ASTRAY));
-            const real height = (met->touch - met->t) * vec_dot(wide, r.direction);
-            place = vec_along(vec_along(r.origin, met->t, r.direction), most(R(0.0), height), wide);
-        } else {
-            asked &= ~here.end.inside & less(R(0.5), vec_dot(gradient, gradient));
-            const vec apart = vec_sub(gradient, at_hit), turned = vec_sub(at_hit, wide);
-            const real share = share_below(apart, LIKE, UNLIKE) * share_below(turned, BESIDE, ASTRAY);
-            *normal = vec_pick(asked, vec_normalize(vec_along(wide, share, turned)), wide);
-            met->touch += pick(asked, share_below(apart, PLACED, UNPLACED) * (met->t - met->touch), R(0.0));
-        }
+        if (i >= lit_turns(settings) || !any_lane(l.asked)) break;
+        surface_point found;
+        const clearance here = orbit_dual_distance(l.place, l.asked, OF_SURFACE, orbit, k, &found);
+        lit_found(&l, i, here, found, r, met, settings);
     }
-    return surface;
+    *there = l.there;
+    *normal = l.normal;
+    return l.surface;
 }
 
 #define POLISH_HEIGHT R(0.16667)
@@ -110,21 +136,14 @@ INLINE surface_point surface_polished(ray r, ray_hit *met, mask active, march_re
     return surface;
 }
 
-// The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
-// exactly it is may matter.
-INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
+// Where a surface is looked at begins: what is not known of it yet.
+INLINE void surface_begin(ray_hit *met) {
     met->touch = least(met->touch, met->last);
-    clearance there;
-    vec normal;
     met->more_steps = met->more_count = R(0.0);
-    surface_point surface;
-    if (polished && settings->polish) {
-        surface = surface_polished(r, met, active, settings, orbit, k, &there);
-        normal = vec_normalize(surface.gradient);
-    } else {
-        surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
-    }
-    if (JOINED) surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
+}
+
+// What is kept of a surface whose gradient is `normal`, before which `there` was found.
+INLINE void surface_end(ray r, ray_hit *met, clearance there, surface_point surface, vec normal, march_record settings, orbit_record orbit) {
     // No gradient: inside the solid already where the ray begins, or an extremum. What the bounds cut has their normal; else face
     // the viewer.
     const mask flat = less(vec_dot(normal, normal), R(0.5)) | there.end.inside;
@@ -143,6 +162,23 @@ INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_rec
     met->part = surface.share;
 }
 
+// The surface where a march has ended: its normal and its escape count. `touch` becomes the place that is shaded. `polished`: where
+// exactly it is may matter.
+INLINE void surface_at(ray r, ray_hit *met, mask active, int polished, march_record settings, orbit_record orbit, constants k) {
+    surface_begin(met);
+    clearance there;
+    vec normal;
+    surface_point surface;
+    if (polished && settings->polish) {
+        surface = surface_polished(r, met, active, settings, orbit, k, &there);
+        normal = vec_normalize(surface.gradient);
+    } else {
+        surface = surface_lit(r, met, active, settings, orbit, k, &there, &normal);
+    }
+    if (JOINED) surface_of_walls(r, met, active & is_blind(there), settings, orbit, k, &surface, &normal);
+    surface_end(r, met, there, surface, normal, settings, orbit);
+}
+
 // Looks at the surfaces that the rays of a queue from number `at` on have met: normals and escape counts, and where exactly
 // they are, if that matters.
 INLINE void look_at(queue q, int at, march_record settings, orbit_record orbit, constants k) {
@@ -153,9 +189,50 @@ INLINE void look_at(queue q, int at, march_record settings, orbit_record orbit, 
     ray_hit_keep_surface(q, at, &e);
 }
 
+#if CARRIES
+// The same of several packets, whose orbits are gathered. The result is where the next ones begin.
+INLINE int look_at_several(queue q, share mine, march_record settings, orbit_record orbit, constants k) {
+    gathered all;
+    lit l[GATHERED];
+    ray_hit met[GATHERED];
+    int places[GATHERED], count = 0, at = mine.next;
+    for (; at < mine.end && count < GATHERED; at += LANES) {
+        ray_hit e = queue_met(q, 0, at);
+        const mask hit = mask_of(e.hit);
+        if (!any_lane(hit)) continue;
+        surface_begin(&e);
+        lit_begin(l + count, queue_ray(q, 0, at), &e, hit);
+        gathered_ask(&all, count, hit, l[count].place);
+        met[count] = e;
+        places[count++] = at;
+    }
+    for (int turn = 0; count > 0 && turn < lit_turns(settings); ++turn) {
+        gathered_run(&all, count, orbit, k);
+        for (int i = 0; i < count; ++i) {
+            surface_point found;
+            clearance here = {R(0.0)};
+            here.end = gathered_surface(&all, i, &found);
+            lit_found(l + i, turn, here, found, queue_ray(q, 0, places[i]), met + i, settings);
+            gathered_ask(&all, i, l[i].asked, l[i].place);
+        }
+    }
+    for (int i = 0; i < count; ++i) {
+        surface_end(queue_ray(q, 0, places[i]), met + i, l[i].there, l[i].surface, l[i].normal, settings, orbit);
+        ray_hit_keep_surface(q, places[i], met + i);
+    }
+    return at;
+}
+#endif
+
 // Looks at the surfaces of a share that was marched. A single lane looks in a kernel of its own, which leaves it more registers for
 // the march.
 INLINE void look_at_share(share mine, queue q, int goal, march_record settings, orbit_record orbit, constants k) {
     if (LANES == 1 || (goal != GOAL_SURFACE && goal != GOAL_POINT)) return;
+#if CARRIES
+    if (!(q.known && settings->polish)) {
+        while (mine.next < mine.end) mine.next = look_at_several(q, mine, settings, orbit, k);
+        return;
+    }
+#endif
     for (int at = mine.next; at < mine.end; at += LANES) look_at(q, at, settings, orbit, k);
 }
