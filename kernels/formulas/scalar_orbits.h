@@ -96,10 +96,18 @@ CALLED void other_scalar_orbits(scalar_orbit *a, scalar_orbit *b, const vec *poi
 INLINE void formula_scalar_orbits(scalar_orbit *a, scalar_orbit *b, const vec *points, const mask *active, mask *late, int carries,
                                   clearance *found, orbit_record orbit, constants k) {
     USUALLY(USUAL_SCALAR_ORBITS)
-    // What a call may write to stays in memory: see `formula_dual_orbit`.
+    // What a call may see or write to stays in memory: see `formula_dual_orbit`.
     scalar_orbit first = *a, second = *b;
-    other_scalar_orbits(&first, &second, points, active, late, carries, found, orbit, k);
+    const vec at[2] = {points[0], points[1]};
+    const mask lanes[2] = {active[0], active[1]};
+    mask go_on[2] = {late[0], late[1]};
+    clearance here[2];
+    other_scalar_orbits(&first, &second, at, lanes, go_on, carries, here, orbit, k);
     *a = first;
     *b = second;
+    late[0] = go_on[0];
+    late[1] = go_on[1];
+    found[0] = here[0];
+    found[1] = here[1];
 }
 #endif

@@ -40,7 +40,7 @@
 
 // A lane that is done takes a new ray at once. Packets that a work-item marches side by side: orbits over dual numbers fill a
 // processor's registers and units without that, and calls empty the registers.
-#define REFILL 1
+#define REFILL (LANES > 8 ? LANES / 8 : 1)
 #define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && LANES > 1 ? 2 : 1)
 #define ORBITS_WAITED(m) (m)->under_way.lanes.waits
 

@@ -17,20 +17,14 @@ INLINE crossing nothing_met(real t) {
     return (crossing){less(R(1.0), R(0.0)), t, t, (real)(REAL_LARGEST), R(0.0), R(0.0), R(0.0)};
 }
 
-INLINE ray ray_pick(mask m, ray yes, ray no) {
-    return (ray){vec_pick(m, yes.origin, no.origin), vec_pick(m, yes.direction, no.direction), pick(m, yes.near, no.near),
-                   pick(m, yes.far, no.far), pick(m, yes.footprint, no.footprint), pick(m, yes.spread, no.spread),
-                   pick(m, yes.known, no.known)};
-}
-
 INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
     return (crossing){(m & yes.hit) | (~m & no.hit), pick(m, yes.t, no.t), pick(m, yes.last, no.last), pick(m, yes.touch, no.touch),
                       pick(m, yes.steps, no.steps), pick(m, yes.count, no.count), pick(m, yes.bad, no.bad)};
 }
 
-// What every march begins with: lanes `fresh` take a ray, of which nothing is found yet.
+// What every march begins with: lanes `fresh` take a ray, of which nothing is found yet. The others are given their own again.
 #define MARCH_TAKES(m, ray, fresh)                                              \
-    (m)->r = ray_pick(fresh, ray, (m)->r);                                      \
+    (m)->r = ray;                                                               \
     (m)->active |= fresh;                                                       \
     (m)->found = crossing_pick(fresh, nothing_met((ray).near), (m)->found)
 // The inside test at the present places of a march.
