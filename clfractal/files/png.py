@@ -27,6 +27,7 @@ SCENE_KEY = "clfractal"
 # Components of a pixel by colour type (section 11.2.1), whose byte ends this beginning of a file.
 _COMPONENTS = {0: 1, 2: 3, 4: 2, 6: 4}
 _TO_COLOR_TYPE = 26
+_CHUNK = 1 << 17  # bytes that are compressed at a time: while that is done the next rows are read
 _LARGEST_TEXT = 16 << 20  # bytes; a scene with a formula library inlined has some ten thousand
 
 
@@ -127,6 +128,7 @@ def stream_png(
         alpha=alpha,
         bitdepth=bits,
         compression=1,
+        chunk_limit=_CHUNK,
         texts=texts or {},
     )
     written = writer.write_packed(stream, _rows(bands, bits, alpha, origin))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -84,7 +85,7 @@ def save_outputs(
             )
             write(
                 path,
-                _colors(developed(store, development), alpha=alpha),
+                _read_ahead(_colors(developed(store, development), alpha=alpha)),
                 width=region.width,
                 height=region.height,
                 alpha=alpha,
@@ -214,6 +215,15 @@ def _colors(picture: Picture, *, alpha: bool) -> Iterator[Floats]:
     names = "RGBA" if alpha else "RGB"
     for _, band in picture.bands():
         yield np.stack([band[name] for name in names], axis=-1)
+
+
+def _read_ahead(bands: Iterator[Floats]) -> Iterator[Floats]:
+    """Bands that a thread reads while the caller writes those before."""
+    with ThreadPoolExecutor(1) as pool:
+        coming = pool.submit(next, bands, None)
+        while (band := coming.result()) is not None:
+            coming = pool.submit(next, bands, None)
+            yield band
 
 
 def _file_key(key: str) -> str:
