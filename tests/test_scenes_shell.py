@@ -128,6 +128,10 @@ def test_a_new_scene_fills_the_picture(clf: InProcess) -> None:
     # Nothing is ever replaced.
     assert clf("new", "first.yaml").is_one_line(2, "first.yaml: exists already and is not replaced")
     assert Path("first.yaml").read_text("utf-8") == text
+    assert clf("new", "none", "--formula", "none").is_one_line(
+        2, "--formula: none is for scenes of objects alone"
+    )
+    assert not Path("none.yaml").exists()
 
 
 @pytest.mark.parametrize("formula", ["apollonian", "kaliset"])

@@ -63,7 +63,7 @@ CARRY = Struct(
 
 def can_carry(old: Job, job: Job) -> bool:
     """Whether a job's pictures look at what an older job's do, from elsewhere, and nothing in them hangs on the eye but
-    highlights: neither mirrors, nor lenses, nor planes that show what is behind them."""
+    highlights, fog and glow: neither mirrors, nor lenses, nor planes that show what is behind them."""
     return len(old.views) == len(job.views) and all(
         _can_follow(before, view) for before, view in zip(old.views, job.views, strict=True)
     )
@@ -73,6 +73,9 @@ def _can_follow(old: PlannedView, view: PlannedView) -> bool:
     scene, region = view.scene, view.plan.region
     plain = isinstance(scene.renderer, SurfaceRenderer) and not isinstance(scene.lighting, PathLighting)
     if not plain or has_lens(scene) or has_lens(old.scene) or bounces(scene) > 0 or scene.cut_planes:
+        return False
+    # The points of a pixel would lie as far apart as those of a pixel of twice its size.
+    if scene.surface.used_points.count > 1:
         return False
     if (
         old.shutter is not None
@@ -145,7 +148,7 @@ class Carrier:
         """
         known = self._made == (old_canvas, old_canvas.stamp)
         if canvas.pixels > self._room:
-            self._ages = []
+            self._ages, self._room = [], 0
             self._ages = [self.device.buffer(canvas.pixels, "a picture on the screen") for _ in range(2)]
             known, self._room = False, canvas.pixels
         while len(self._records) < len(views):

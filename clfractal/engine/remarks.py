@@ -27,9 +27,10 @@ from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.grid_values import in_words, is_finite_somewhere, lacking
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject
+from clfractal.scene.objects import FormulaObject, VolumeObject
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
+from clfractal.schema.shape import Solid
 
 if TYPE_CHECKING:
     from clfractal.engine.comfort import Comfort
@@ -230,10 +231,17 @@ def _of_motion(seen: _Seen) -> list[str]:
 
 def _why_no_surface(seen: _Seen) -> str:
     """Why no ray met the set; empty if that need not be a mistake."""
-    if not seen.scene.has_set:
-        return ""
     center, radius = seen.scene.bounds
-    if not any(_meets_ball(view.camera, np.array(center), radius).any() for view in seen.views):
+    misses = not any(_meets_ball(view.camera, np.array(center), radius).any() for view in seen.views)
+    if not seen.scene.has_set:
+        objects = seen.scene.objects.values()
+        if not misses or not objects or not all(isinstance(each, (Solid, VolumeObject)) for each in objects):
+            return ""
+        return (
+            f"no ray meets the objects, in a ball of radius {radius:g} around {_point(center)}: turn camera.target to"
+            " them"
+        )
+    if misses:
         return (
             f"no ray meets the set; its bounds, a ball of radius {radius:g} around {_point(center)}, are not in the"
             " picture: turn camera.target to them"

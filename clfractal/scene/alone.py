@@ -20,9 +20,8 @@ def check_alone(scene: Scene) -> None:
         return
     renderer = scene.renderer
     if not isinstance(renderer, SurfaceRenderer) and not _shows_a_file(renderer):
-        raise SceneError(
-            f"none is for surface renderers, got a {renderer.type}; name a formula", Where(path="formula")
-        )
+        message = f"none is for surface renderers, got a {renderer.type}; name a formula"
+        raise SceneError(message, Where(path="formula"))
     for path, what, way_out in _asking(scene):
         raise SceneError(f"{what} a formula, and the scene's is none; {way_out}".lstrip(), Where(path=path))
 

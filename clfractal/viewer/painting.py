@@ -14,7 +14,7 @@ from clfractal.engine.carry import Carrier, can_carry
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Progress, run
-from clfractal.errors import ClfractalError
+from clfractal.errors import ClfractalError, DeviceError
 from clfractal.integrators.kept import Borrowing, Kept
 from clfractal.integrators.plan import PlannedView
 from clfractal.viewer.frame import CanvasPool, Frame
@@ -120,21 +120,37 @@ class Painter:
             carries: see `carries`; then only a part of the pixels is rendered.
         """
         whole = job.coarse(divider)
-        carrier = self._carrier if carries else None
-        if carrier is None or front is None:
-            canvas = self.canvas(whole, front)
-            state = self.run(whole, canvas, token)
-            pixels, seconds, carrying = canvas.pixels, state.seconds, 0.0
-        else:
-            part = carrier.begin(job, divider)
-            state = self.run(part, carrier.fresh, token)
-            canvas = self.canvas(whole, front)
-            pixels, seconds, start = carrier.fresh.pixels, state.seconds, time.perf_counter()
-            carrier.carry(front.views, front.canvas, whole.views, canvas)
-            carrying = time.perf_counter() - start
-            pacing.learn_carrying(canvas.pixels, carrying)
-        pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
-        return Moved(whole.views, canvas, carrier is not None, seconds + carrying)
+        if carries and self._carrier is not None and front is not None:
+            try:
+                return self._carried(self._carrier, job, whole, divider, front, token, pacing)
+            except DeviceError:
+                # No room for it, probably: pictures move as they do without.
+                self._carrier = None
+                self.executor.forget()
+        canvas = self.canvas(whole, front)
+        state = self.run(whole, canvas, token)
+        pacing.learn(canvas.pixels, 1e-3 * state.kernel_ms, state.seconds)
+        return Moved(whole.views, canvas, False, state.seconds)
+
+    def _carried(
+        self,
+        carrier: Carrier,
+        job: Job,
+        whole: Job,
+        divider: int,
+        front: Frame,
+        token: CancelToken,
+        pacing: Pacing,
+    ) -> Moved:
+        part = carrier.begin(job, divider)
+        state = self.run(part, carrier.fresh, token)
+        canvas = self.canvas(whole, front)
+        start = time.perf_counter()
+        carrier.carry(front.views, front.canvas, whole.views, canvas)
+        carrying = time.perf_counter() - start
+        pacing.learn_carrying(canvas.pixels, carrying)
+        pacing.learn(carrier.fresh.pixels, 1e-3 * state.kernel_ms, state.seconds)
+        return Moved(whole.views, canvas, True, state.seconds + carrying)
 
     def canvas(self, job: Job, front: Frame | None) -> Canvas:
         """A canvas for a job's views; not the one of the frame that is shown."""
@@ -197,7 +213,9 @@ class CarryProgram:
 
     def work(self, executor: LocalExecutor, token: CancelToken, tell: Callable[[str], None]) -> None:
         """See `Task`."""
-        self._painter.prepare(token)
+        # (A painter of another device, to which the window's tasks have moved, asks for its own.)
+        if executor.device is self._painter.device:
+            self._painter.prepare(token)
         self.finished = True
 
     def failed(self, error: ClfractalError) -> None:

@@ -138,7 +138,7 @@ __kernel void carry(__global const float4 *fresh_colors, __global const float *f
             seen.color = (float4)(0.0f);
             for (int i = 0; i < 4; ++i) seen.color += 0.25f * fresh_colors[around[i]];
             seen.depth = open ? INFINITY : farthest;
-            seen.age = 0;
+            seen.age = c->oldest;
         }
     } else {
         for (int i = 0; i < 4; ++i) seen.color += 0.25f * fresh_colors[around[i]];

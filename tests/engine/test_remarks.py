@@ -83,6 +83,20 @@ def test_no_ray_meets_the_set(engine: clfractal.Engine) -> None:
     one(of(engine, cut_planes=cut), "although rays go through its bounds; cut_planes may have removed it")
 
 
+def test_no_ray_meets_objects_alone(engine: clfractal.Engine) -> None:
+    ball, floor = {"type": "sphere", "radius": 0.5}, {"type": "plane", "position": [0, 0, -1]}
+
+    def seen(camera: Any, **objects: Any) -> tuple[str, ...]:
+        return engine.render(scene_of("none", camera, SIZE, objects=objects)).remarks
+
+    one(
+        seen(AWAY, ball=ball),
+        "no ray meets the objects",
+        "around [0, 0, 0]: turn camera.target",
+    )
+    assert seen(CAMERA, ball=ball) == seen(AWAY, ball=ball, floor=floor) == seen(AWAY) == ()
+
+
 @pytest.mark.parametrize("channels", [["R", "G", "B"], ["Z"]])
 def test_channels_are_not_needed(channels: list[str], engine: clfractal.Engine) -> None:
     scene = scene_of(BALL, AWAY, SIZE)

@@ -104,7 +104,9 @@ def test_nothing_that_knows_a_formula_is_launched(device: Device, way: str) -> N
         }
 
 
-def test_a_picture_is_a_scene_again_and_can_be_resumed(clf: InProcess, tmp_path: Path) -> None:
+def test_a_picture_is_a_scene_again_and_resume_begins_where_there_is_no_work(
+    clf: InProcess, tmp_path: Path
+) -> None:
     scene, whole = tmp_path / "alone.yaml", tmp_path / "whole.exr"
     scene.write_text(
         "version: 1\nformula: none\ncamera: {position: [0, -3, 1]}\nimage: {width: 40, height: 36}\n"

@@ -185,8 +185,9 @@ def job_of(device: Device, *overrides: str) -> Job:
         ("material.reflection=0.5",),
         ("camera.f_number=2",),
         (HALVES,),
+        ("renderer.points={count: 9}",),
     ],
-    ids=["volume", "cut plane", "paths", "mirror", "lens", "a cut plane beside it"],
+    ids=["volume", "cut plane", "paths", "mirror", "lens", "a cut plane beside it", "points"],
 )
 def test_what_hangs_on_more_than_the_place_of_a_surface_is_rendered(
     more: tuple[str, ...], device: Device
@@ -240,11 +241,14 @@ def test_sparse_views_have_the_rays_of_the_whole_one(device: Device) -> None:
                 assert sparse.first[axis] == whole.first[axis] + divider * phase[axis]
 
 
-def test_without_its_program_pictures_move_as_before(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("what", ["__init__", "begin", "carry"])
+def test_where_it_fails_pictures_move_as_before(
+    what: str, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
     def fails(*_: object, **__: object) -> None:
         raise DeviceError("there is no room")
 
-    monkeypatch.setattr(carrying.Carrier, "__init__", fails)
+    monkeypatch.setattr(carrying.Carrier, what, fails)
     scene = scene_of(BULB)
     with session_on(device, Pacing(coarsest=1)) as watch:
         watch.finished(scene)

@@ -38,7 +38,7 @@
 #define BLIND_LEAST R(0.015625)  // ... but at least this part of the full step
 #define BLIND_GROWTH R(1.5)
 
-// A lane that is done takes a new ray at once. Packets that a work-item marches side by side: orbits over dual numbers fill a
+// So many lanes have to be done before they take new rays. Packets that a work-item marches side by side: orbits over dual numbers fill a
 // processor's registers and units without that, and calls empty the registers.
 #define REFILL (LANES > 8 ? LANES / 8 : 1)
 #define ABREAST (HAS_DERIVATIVE && !HAS_CALLS && LANES > 1 ? 2 : 1)
