@@ -24,7 +24,7 @@ from clfractal.integrators.trial import RULES, Rule, march, picture_side
 LANES_VARIABLE = "CLFRACTAL_LANES"
 JOB = "clfractal.integrators.lanes:march_job"
 
-_VERSION = 3  # of this measurement: older ones no longer count
+_VERSION = 4  # of this measurement and of the marches that it measures: older ones no longer count
 _SECTION = "marches"
 _TIMEOUT_S = 60.0
 # What a picture has beside the trial gains from wide packets: they are chosen up to so many times the best time.
