@@ -27,9 +27,8 @@ def begin() -> None:
     """Lets the drivers begin. What fails here fails again where they are asked for, and is told there."""
     if _under_way:
         return
-    with suppress(
-        ClfractalError, OSError, AttributeError
-    ):  # the last where names of another library are not found in one
+    # (An AttributeError where the names of a library are not found in another that it loads.)
+    with suppress(ClfractalError, OSError, AttributeError):
         use_opencl()
         library = ctypes.CDLL(cl._cl.__file__)
         platforms, devices = library.clGetPlatformIDs, library.clGetDeviceIDs

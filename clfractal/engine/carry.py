@@ -33,6 +33,7 @@ RENDERED = 1 / len(PHASES)
 """The part of a moving picture's pixels that is rendered."""
 OLDEST = 6
 """For so many frames, at most, a pixel shows what was rendered once."""
+_CHANNELS = {"R", "G", "B", "A", "Z"}
 _ONE_SURFACE = 12.0
 """Neighbours are of one surface if their depths differ by no more, pixels."""
 
@@ -77,18 +78,12 @@ def _can_follow(old: PlannedView, view: PlannedView) -> bool:
     # The points of a pixel would lie as far apart as those of a pixel of twice its size.
     if scene.surface.used_points.count > 1:
         return False
-    if (
-        old.shutter is not None
-        or view.shutter is not None
-        or type(old.scene.camera) is not type(scene.camera)
-    ):
+    if old.shutter is not None or view.shutter is not None:
+        return False
+    if type(old.scene.camera) is not type(scene.camera) or not set(view.plan.channels) >= _CHANNELS:
         return False
     whole = (region.x, region.y) == (0, 0) and region == old.plan.region
-    return (
-        whole
-        and {"R", "G", "B", "A", "Z"} <= set(view.plan.channels)
-        and _looked_at(old.scene, scene) == scene
-    )
+    return whole and _looked_at(old.scene, scene) == scene
 
 
 def _looked_at(scene: Scene, by: Scene) -> Scene:
