@@ -17,6 +17,7 @@ import pytest
 import clfractal
 from clfractal.cli import run
 from clfractal.cli.shell import Shell
+from clfractal.files.journal import SIDE, identity_of
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 8}
@@ -157,3 +158,19 @@ class Running:
 def has_bytes(path: Path, least: int) -> Callable[[], bool]:
     """Whether a file is there that has more than so many."""
     return lambda: path.exists() and path.stat().st_size > least
+
+
+def has_tiles(path: Path, least: int = 1) -> Callable[[], bool]:
+    """Whether a journal is there that has so many whole tiles; notes of who made them are records of the same size."""
+    return lambda: _tiles_in(path) >= least
+
+
+def _tiles_in(path: Path) -> int:
+    identity = identity_of(path)
+    if identity is None:
+        return 0
+    record = 8 + len(identity["channels"]) * SIDE * SIDE * 4
+    data = path.read_bytes()
+    start = 16 + int.from_bytes(data[8:12], "little")
+    whole = range(start, len(data) - record + 1, record)
+    return sum(data[place : place + 4] != b"\xff\xff\xff\xff" for place in whole)

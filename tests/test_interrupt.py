@@ -26,7 +26,7 @@ from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes
 from tests.long_renders import ENDLESS, LIMIT_SECONDS, PROMISE_SECONDS, interrupt, interrupted_in_a_kernel
-from tests.shell import SCENE, Running, has_bytes, process, python, wait_until, works
+from tests.shell import SCENE, Running, has_tiles, process, python, wait_until, works
 
 pytestmark = [
     pytest.mark.usefixtures("interrupts_are_not_ignored"),
@@ -255,14 +255,10 @@ def begun(folder: Path, *arguments: str, **settings: Any) -> Running:
     return Running(folder, *arguments, **settings)
 
 
-# (A tile of its four channels has 64 KB; before the first there is but the header.)
-HEADER = 100_000
-
-
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_render_is_continued(tmp_path: Path, sent: signal.Signals) -> None:
     work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
-    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
+    work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
     status, told = work.ended_by(sent)
     assert status == 128 + sent
     found = re.fullmatch(
@@ -313,7 +309,7 @@ def test_what_was_ignored_stays_so(tmp_path: Path) -> None:
             signal.signal(each, signal.SIG_IGN)
 
     work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet", before=ignore)
-    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
+    work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
     before = (tmp_path / "a.exr.partial").stat().st_size
     work.process.send_signal(signal.SIGHUP)
     work.process.send_signal(signal.SIGINT)
@@ -362,7 +358,7 @@ def test_the_first_signal_counts(tmp_path: Path, code: str) -> None:
     """Whatever comes afterwards: other signals, or an error that is a consequence."""
     words = [sys.executable, "-P", "-c", code, "render", "scene.yaml", "-o", "a.exr", "--quiet"]
     work = begun(tmp_path, words=words)
-    work.wait_until(has_bytes(tmp_path / "a.exr.partial", HEADER))
+    work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
     status, told = work.ended_by(signal.SIGTERM)
     assert status == 143, told
     assert told.count("\n") == 1

@@ -26,7 +26,7 @@ from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
 from tests.interrupts import planes
 from tests.long_renders import HEAVY, TILES
-from tests.shell import SCENE, Ended, Running, command, environment, has_bytes, process, python, works
+from tests.shell import SCENE, Ended, Running, command, environment, has_tiles, process, python, works
 from tests.variants import one_of
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
@@ -80,7 +80,7 @@ def test_resuming_renders_only_what_is_missing(undisturbed: tuple[Path, float], 
     """Killed as soon as there is a tile on the disk; the statistics tell what the second run did."""
     (tmp_path / "heavy.yaml").write_text(HEAVY)
     running = Running(tmp_path, "render", "heavy.yaml", "-o", "out.exr", "--quiet")
-    running.wait_until(has_bytes(tmp_path / "out.exr.partial", 2 * (8 + 8 * 32 * 32 * 4)))
+    running.wait_until(has_tiles(tmp_path / "out.exr.partial", 2))
     assert running.ended_by(signal.SIGKILL)[0] == -signal.SIGKILL
     assert render(tmp_path, "--resume", "--stats", "stats.json", "--quiet") == Ended(0, "", "")
     stats = json.loads((tmp_path / "stats.json").read_text())
@@ -214,7 +214,7 @@ def stopped(folder: Path, number: signal.Signals, side: str) -> tuple[int, str]:
     """A render that gets a signal as soon as some of an eye's tiles are on the disk: status, and standard error."""
     (folder / "heavy.yaml").write_text(PAIR)
     running = Running(folder, words=[sys.executable, "-P", "-c", SLOWLY])
-    running.wait_until(has_bytes(folder / side, 8 * 32 * 32 * 4))
+    running.wait_until(has_tiles(folder / side))
     return running.ended_by(number)
 
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from tests.shell import Running, environment, has_bytes, wait_until
+from tests.shell import Running, environment, has_tiles, wait_until
 
 # Work of some ten seconds of one core, in tiles of a tenth of a second.
 HEAVY = """version: 1
@@ -170,5 +170,5 @@ class Client(Running):
 
 
 def journal_grows(folder: Path, name: str = "out.exr.partial", least: int = 1, seconds: float = 60) -> None:
-    """Waits until some tiles lie in a journal."""
-    wait_until(has_bytes(folder / name, 30_000 * least), seconds=seconds)
+    """Waits until so many tiles lie in a journal."""
+    wait_until(has_tiles(folder / name, least), seconds=seconds)

@@ -28,7 +28,7 @@ from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
 from tests.halves import halves_of
 from tests.long_renders import LIMIT_SECONDS
-from tests.shell import Running, has_bytes
+from tests.shell import Running, has_tiles
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
 
@@ -282,10 +282,6 @@ main()
 """
 
 
-# Bytes of a journal that has some: each has nine channels.
-SOME_TILES = 5 * 9 * 32 * 32 * 4
-
-
 def started(folder: Path, patience: float) -> Running:
     (folder / "scene.yaml").write_text(SCENE)
     given = ["render", "scene.yaml", "-o", "out.exr", "--device", halves_of(choose())]
@@ -306,7 +302,7 @@ def test_ctrl_c_while_a_device_hangs(tmp_path: Path) -> None:
     for _ in range(3):
         running = started(tmp_path, 1000.0)
         running.wait_until((tmp_path / "hangs").exists)
-        running.wait_until(has_bytes(tmp_path / "out.exr.partial", SOME_TILES))
+        running.wait_until(has_tiles(tmp_path / "out.exr.partial", 5))
         time.sleep(1.0)  # the other one has done all that it can
         begin = time.monotonic()
         status, told = running.ended_by(signal.SIGINT)
