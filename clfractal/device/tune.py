@@ -80,7 +80,12 @@ def lane_reports(
                 on_start = None
             doing = f"trying {lanes} lanes"
             answer, is_known = tried(
-                PROBE, device, precision, lanes, doing=doing, timeout_s=PROBE_TIMEOUT_S, stopped=stopped
+                PROBE,
+                device,
+                {"lanes": lanes, "precision": precision},
+                doing=doing,
+                timeout_s=PROBE_TIMEOUT_S,
+                stopped=stopped,
             )
             report = LaneReport(lanes, str(answer["fault"]))
             if is_known:
@@ -154,23 +159,21 @@ def is_of_the_device(error: ClfractalError) -> bool:
 def tried(
     job: str,
     device: Device,
-    precision: Precision,
-    lanes: int,
+    request: Mapping[str, Any],
     *,
     doing: str,
     timeout_s: float,
     stopped: Callable[[], bool] | None,
 ) -> tuple[dict[str, Any], bool]:
-    """What a job in a child process answers about a lane count, or its `fault`; and whether that may be remembered.
+    """What a job in a child process answers about lane counts, or its `fault`; and whether that may be remembered.
 
     Args:
-        doing, timeout_s, stopped: as of `isolate.run`.
+        request, doing, timeout_s, stopped: as of `isolate.run`.
 
     Raises:
         FileError: there is no room for what the driver writes.
         Stopped: `stopped` answered True.
     """
-    request = {"lanes": lanes, "precision": precision}
     try:
         with activity.doing(f"measuring {device.info.name}"):
             return isolate.run(job, device, request, doing=doing, timeout_s=timeout_s, stopped=stopped), True

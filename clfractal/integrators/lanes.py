@@ -1,9 +1,10 @@
 """Finds the fastest lane count of a device, measured once with the march that renders.
 
-Small pictures are marched with each lane count that works (`device/tune.py`): the Mandelbulb by its scalar rule, and hast
-by its Jacobian, since what fits one into the processor's registers need not fit the other. Before that a first picture
-takes the count that fits the device's registers, once a trial has shown that it computes rightly: it does not wait for the
-measurement. A process keeps the count that it began with, because the last bits of a picture depend on it.
+Small pictures are marched with each lane count that works (`device/tune.py`), in turns (`rounds.py`): the Mandelbulb by its
+scalar rule, and hast by its Jacobian, since what fits one into the processor's registers need not fit the other. Before
+that a first picture takes the count that fits the device's registers, once a trial has shown that it computes rightly: it
+does not wait for the measurement. A process keeps the count that it began with, because the last bits of a picture depend
+on it.
 """
 
 from __future__ import annotations
@@ -19,16 +20,15 @@ from clfractal.device.structs import Precision
 from clfractal.errors import STATUS_BAD_INPUT, DeviceError
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
-from clfractal.integrators.trial import RULES, Rule, march, picture_side
+from clfractal.integrators.rounds import compared, widest
+from clfractal.integrators.trial import RULES, Marcher, Rule, picture_side
 
 LANES_VARIABLE = "CLFRACTAL_LANES"
 JOB = "clfractal.integrators.lanes:march_job"
 
-_VERSION = 4  # of this measurement and of the marches that it measures: older ones no longer count
+_VERSION = 5  # of this measurement and of the marches that it measures: older ones no longer count
 _SECTION = "marches"
-_TIMEOUT_S = 60.0
-# What a picture has beside the trial gains from wide packets: they are chosen up to so many times the best time.
-_NEARLY = 1.1
+_TIMEOUT_S = 60.0  # for each lane count
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,8 +93,7 @@ def best_lanes(
     if key not in _in_use:
         if measures or is_measured(device, precision):
             reports = march_reports(device, precision, on_start=on_start)
-            best = min(report.nanoseconds(rule) for report in reports)
-            lanes = max(report.lanes for report in reports if report.nanoseconds(rule) <= _NEARLY * best)
+            lanes = widest({report.lanes: report.nanoseconds(rule) for report in reports})
         else:
             lanes = tune.first_lanes(device, precision, on_start=on_start)
         _in_use[key] = lanes
@@ -132,11 +131,12 @@ def march_reports(
     stopped: Callable[[], bool] | None = None,
 ) -> tuple[MarchReport, ...]:
     """How fast each promising lane count that works marches, at least one; measured if this device and driver were not
-    before. The speed of the best, in float32, is what devices are ranked by.
+    before. The speed of the best, in float32, is what devices are ranked by. Where a device was too busy to tell, this
+    process keeps what it has found, and the next one measures again.
 
     Raises:
         DeviceError: as `best_lanes`.
-        Stopped: `stopped` answered True; what was measured until then is remembered.
+        Stopped: `stopped` answered True; which lane counts work is remembered as far as it was found out.
     """
     key = _key(device, precision)
     if key not in _reports:
@@ -149,17 +149,16 @@ def _measured_reports(
 ) -> tuple[MarchReport, ...]:
     faults: list[str] = []
     for lane_counts in tune.promising(device):
-        reports = []
-        for check in tune.lane_reports(device, precision, lane_counts, on_start=tell, stopped=stopped):
-            report = _measured(device, precision, check.lanes, tell, stopped) if check.accepted else None
-            if report is not None and not report.fault:
-                reports.append(report)
-            else:
-                faults.append(f"{check.lanes} lanes: {report.fault if report is not None else check.fault}")
+        checks = tune.lane_reports(device, precision, lane_counts, on_start=tell, stopped=stopped)
+        faults += [f"{check.lanes} lanes: {check.fault}" for check in checks if not check.accepted]
+        working = [check.lanes for check in checks if check.accepted]
+        found, is_steady = _marched(device, precision, working, tell, stopped)
+        faults += [f"{report.lanes} lanes: {report.fault}" for report in found if report.fault]
+        reports = tuple(report for report in found if not report.fault)
         if reports:
-            if precision == "float32":
+            if precision == "float32" and is_steady:
                 cache.remember(select.SPEEDS, device.info.key, pixels_per_second(reports))
-            return tuple(reports)
+            return reports
     raise tune.none_works(device, faults)
 
 
@@ -181,27 +180,65 @@ def _once(listener: Callable[[str], None] | None) -> Callable[[str], None]:
     return tell
 
 
-def _measured(
+def _marched(
     device: Device,
     precision: Precision,
-    lanes: int,
-    on_start: Callable[[str], None],
+    lane_counts: Sequence[int],
+    tell: Callable[[str], None],
     stopped: Callable[[], bool] | None,
-) -> MarchReport:
-    key = _name(device, precision, lanes)
-    known = tune.recalled(MarchReport, cache.recall(_SECTION).get(key))
-    if known is not None:
-        return known
-    on_start(f"measuring {device.info.name}, once")
-    doing = f"marching with {lanes} lanes"
+) -> tuple[list[MarchReport], bool]:
+    """Of each lane count, and whether they may be relied on; remembered, or measured together and then remembered."""
+    known = cache.recall(_SECTION)
+    recalled = {
+        lanes: tune.recalled(MarchReport, known.get(_name(device, precision, lanes))) for lanes in lane_counts
+    }
+    found = {lanes: report for lanes, report in recalled.items() if report is not None}
+    if len(found) == len(lane_counts):
+        return list(found.values()), True
+    tell(f"measuring {device.info.name}, once")
+    sound = [lanes for lanes in lane_counts if lanes not in found or not found[lanes].fault]
+    reports, is_known = _together(device, precision, sound, stopped)
+    if len(sound) > 1 and any(report.fault for report in reports):
+        # On which of them the driver fails is found out one by one; the others are compared then.
+        alone = {}
+        for lanes in sound:
+            (alone[lanes],), is_known = _together(device, precision, [lanes], stopped)
+            if alone[lanes].fault:
+                found[lanes] = alone[lanes]
+                _remember(device, precision, found[lanes], is_known)
+        sound = [lanes for lanes in sound if not alone[lanes].fault]
+        reports, is_known = _together(device, precision, sound, stopped)
+        if any(report.fault for report in reports):
+            reports, is_known = [alone[lanes] for lanes in sound], False
+    for report in reports:
+        found[report.lanes] = report
+        _remember(device, precision, report, is_known)
+    return [found[lanes] for lanes in lane_counts], is_known
+
+
+def _together(
+    device: Device, precision: Precision, lane_counts: Sequence[int], stopped: Callable[[], bool] | None
+) -> tuple[list[MarchReport], bool]:
+    """Of lane counts that take turns in one child process; all of them have its fault. And whether that is to be kept."""
+    if not lane_counts:
+        return [], True
     answer, is_known = tune.tried(
-        JOB, device, precision, lanes, doing=doing, timeout_s=_TIMEOUT_S, stopped=stopped
+        JOB,
+        device,
+        {"lanes": list(lane_counts), "precision": precision},
+        doing=f"marching with {' and '.join(map(str, lane_counts))} lanes",
+        timeout_s=_TIMEOUT_S * len(lane_counts),
+        stopped=stopped,
     )
-    found: dict[str, Any] = {"scalar": 0.0, "jacobian": 0.0, "fault": "", **answer}
-    report = MarchReport(lanes, **found)
+    if "fault" in answer:
+        return [MarchReport(lanes, 0.0, 0.0, str(answer["fault"])) for lanes in lane_counts], is_known
+    times = zip(lane_counts, answer["scalar"], answer["jacobian"], strict=True)
+    return [MarchReport(*each, "") for each in times], bool(answer["steady"])
+
+
+def _remember(device: Device, precision: Precision, report: MarchReport, is_known: bool) -> None:
     if is_known:
-        cache.remember(_SECTION, key, asdict(report))
-    return report
+        cache.remember(_SECTION, _name(device, precision, report.lanes), asdict(report))
 
 
 def _key(device: Device, precision: Precision) -> tuple[str, str, str]:
@@ -214,16 +251,28 @@ def _name(device: Device, precision: Precision, lanes: int) -> str:
 
 
 def march_job(request: Mapping[str, Any]) -> dict[str, Any]:
-    """In a child process: marches the pictures with `request["lanes"]` in `request["precision"]`.
+    """In a child process: marches the pictures with each of `request["lanes"]` in `request["precision"]`.
 
-    Returns `scalar` and `jacobian`: nanoseconds a pixel, in the shortest of some launches.
+    Returns `scalar` and `jacobian`: nanoseconds a pixel with each lane count; and `steady`: whether they can be relied on.
     """
     device = select.by_key(*request["device"])
-    lanes, precision = int(request["lanes"]), request["precision"]
+    lane_counts, precision = [int(lanes) for lanes in request["lanes"]], request["precision"]
     if select.is_simulator(device.info):
         # It would take minutes, and only tells that wide packets are fewer instructions.
-        return dict.fromkeys(RULES, 1000000000.0 / lanes)
-    sides = {rule: picture_side(device, rule) for rule in RULES}
-    return {
-        rule: 1e6 * march(device, precision, lanes, rule, sides[rule])[0] / sides[rule] ** 2 for rule in RULES
-    }
+        times = [1000000000.0 / lanes for lanes in lane_counts]
+        return {**dict.fromkeys(RULES, times), "steady": True}
+    answer: dict[str, Any] = {"steady": True}
+    for rule in RULES:
+        answer[rule], is_steady = _raced(device, precision, lane_counts, rule)
+        answer["steady"] = answer["steady"] and is_steady
+    return answer
+
+
+def _raced(
+    device: Device, precision: Precision, lane_counts: Sequence[int], rule: Rule
+) -> tuple[list[float], bool]:
+    """Nanoseconds a pixel by a rule with each lane count, and whether they can be relied on."""
+    side = picture_side(device, rule)
+    marchers = {lanes: Marcher(device, precision, lanes, rule, side) for lanes in lane_counts}
+    least, is_steady = compared(lane_counts, lambda lanes: marchers[lanes].milliseconds())
+    return [1e6 * least[lanes] / side**2 for lanes in lane_counts], is_steady

@@ -40,7 +40,8 @@ RULES: tuple[Rule, ...] = ("scalar", "jacobian")
 _SIDES: dict[Rule, int] = {"scalar": 256, "jacobian": 160}
 _SIDE_GPU = 1024
 _RAYS_OF_CORE = 2048
-_LAUNCHES, _SECONDS = 100, 0.2
+# Of a turn, see `rounds.py`.
+_LAUNCHES, _SECONDS = 25, 0.03
 # Places in the queue's structs.
 _HIT, _T = 0, 3
 
@@ -103,41 +104,51 @@ def program_text(formula: FormulaText, lanes: int, precision: Precision) -> Flat
     return flatten("integrators/march/march_probe.cl", generated=generated, defines=defines)
 
 
-def march(
-    device: Device, precision: Precision, lanes: int, rule: Rule, side: int
-) -> tuple[float, npt.NDArray[np.float32]]:
-    """Marches a picture of `side` x `side` pixels, a multiple of 8, and a shadow ray from each hit.
+class Marcher:
+    """A picture of `side` x `side` pixels, a multiple of 8, and a shadow ray from each hit: marched as often as wanted.
 
-    Returns:
-        Milliseconds of the fastest launches, and for each pixel, shape (side, side, 2), how far its ray went (-1 where it
-        met nothing) and whether the light is hidden there.
+    Both were marched once when it is made, so a driver has compiled all.
 
     Raises:
         DeviceError, KernelBuildError: the device failed.
     """
-    example = _EXAMPLES[rule]
-    chain = load_chain(example.formula, example.parameters)
-    trial = _Trial(device, precision, lanes, chain, example.iterations)
-    eye_rays = _eye_rays(example, side)
-    took, met = trial.march(eye_rays, GOAL_SURFACE)
-    hit, t = met[_HIT] > 0.5, met[_T]
-    toward = np.array(example.light) / np.linalg.norm(example.light)
-    cone = eye_rays.spreads * t
-    points = eye_rays.origins + t[:, None] * eye_rays.directions
-    lift = SHADOW_LIFT * SurfaceRenderer.model_validate({}).detail
-    shadow_rays = _Rays(
-        (points + (cone * lift)[:, None] * toward)[hit],
-        np.broadcast_to(toward, points[hit].shape),
-        (cone * SHADOW_DETAIL)[hit],
-        np.zeros(int(hit.sum())),
-    )
-    more, shadow = trial.march(shadow_rays, GOAL_SHADOW)
-    result = np.zeros((side * side, 2), np.float32)
-    result[:, 0] = np.where(hit, t, -1.0)
-    result[hit, 1] = shadow[_HIT] > 0.5
-    picture = np.empty_like(result)
-    picture[_block_order(side)] = result
-    return max(took + more, 1e-3), picture.reshape(side, side, 2)
+
+    def __init__(self, device: Device, precision: Precision, lanes: int, rule: Rule, side: int) -> None:
+        example = _EXAMPLES[rule]
+        chain = load_chain(example.formula, example.parameters)
+        self._side = side
+        self._trial = _Trial(device, precision, lanes, chain, example.iterations)
+        eye_rays = _eye_rays(example, side)
+        self._eye = self._trial.launch(eye_rays, GOAL_SURFACE)
+        met = self._eye.met()
+        self._hit, self._t = met[_HIT] > 0.5, met[_T]
+        hit, t = self._hit, self._t
+        toward = np.array(example.light) / np.linalg.norm(example.light)
+        cone = eye_rays.spreads * t
+        points = eye_rays.origins + t[:, None] * eye_rays.directions
+        lift = SHADOW_LIFT * SurfaceRenderer.model_validate({}).detail
+        shadow_rays = _Rays(
+            (points + (cone * lift)[:, None] * toward)[hit],
+            np.broadcast_to(toward, points[hit].shape),
+            (cone * SHADOW_DETAIL)[hit],
+            np.zeros(int(hit.sum())),
+        )
+        self._shadow = self._trial.launch(shadow_rays, GOAL_SHADOW)
+
+    def milliseconds(self) -> float:
+        """Of the fastest of some launches of either kind."""
+        return max(self._eye.milliseconds() + self._shadow.milliseconds(), 1e-3)
+
+    def picture(self) -> npt.NDArray[np.float32]:
+        """For each pixel, shape (side, side, 2): how far its ray went (-1 where it met nothing), and whether the light is
+        hidden there."""
+        side, hit = self._side, self._hit
+        result = np.zeros((side * side, 2), np.float32)
+        result[:, 0] = np.where(hit, self._t, -1.0)
+        result[hit, 1] = self._shadow.met()[_HIT] > 0.5
+        picture = np.empty_like(result)
+        picture[_block_order(side)] = result
+        return picture.reshape(side, side, 2)
 
 
 class _Trial:
@@ -168,35 +179,63 @@ class _Trial:
         cl.enqueue_copy(self.device.queue, buffer, np.ascontiguousarray(array).view(np.uint8).reshape(-1))
         return buffer
 
-    def march(self, rays: _Rays, goal: int) -> tuple[float, Numbers]:
-        """Milliseconds of the fastest launch, and what the rays have met, shape (13, count)."""
+    def launch(self, rays: _Rays, goal: int) -> _Launch:
+        """What marches these rays; it has done so once."""
         numbers = rays.numbers(self.chain)
         count = numbers.shape[1]
         stride = count + STATE_PADDING
         queue = np.zeros((len(numbers), stride), self.precision)
         queue[:, :count] = numbers
-        met = np.zeros((MET_NUMBERS, stride), self.precision)
-        sent, found = self._upload(queue), self._upload(met)
+        found = np.zeros((MET_NUMBERS, stride), self.precision)
         share = rays_of_item(self.lanes, count, self.device.info.compute_units)
-        self.kernel.set_args(
-            sent,
-            found,
+        group = fitting(self.device, self.kernel, rays_group(self.lanes))
+        arguments = (
+            self._upload(queue),
+            self._upload(found),
             *self.scene,
             *(np.int32(each) for each in (count, stride, share, goal)),
         )
-        group = fitting(self.device, self.kernel, rays_group(self.lanes))
         size = (-(-count // (group[0] * share)) * group[0],)
-        times: list[float] = []
-        with self.device.failures("marching"):
-            # The first launch makes PoCL compile.
-            for _ in range(1 + _LAUNCHES):
-                event = cl.enqueue_nd_range_kernel(self.device.queue, self.kernel, size, group)
-                event.wait()
-                times.append(1e-6 * (event.profile.end - event.profile.start))
-                if len(times) > 2 and sum(times[1:]) > 1e3 * _SECONDS:
-                    break
-            cl.enqueue_copy(self.device.queue, met, found)
-        return min(times[1:]), met[:, :count].astype(np.float64)
+        return _Launch(self, arguments, count, size, group)
+
+
+class _Launch:
+    """Rays on the device, and the launch that marches them."""
+
+    def __init__(
+        self,
+        trial: _Trial,
+        arguments: tuple[Any, ...],
+        count: int,
+        size: tuple[int, ...],
+        group: tuple[int, ...],
+    ) -> None:
+        self._trial, self._arguments, self._count = trial, arguments, count
+        self._size, self._group = size, group
+        self._once()
+
+    def _once(self) -> float:
+        """Marches the rays; milliseconds of the device."""
+        trial = self._trial
+        with trial.device.failures("marching"):
+            trial.kernel.set_args(*self._arguments)
+            event = cl.enqueue_nd_range_kernel(trial.device.queue, trial.kernel, self._size, self._group)
+            event.wait()
+            return 1e-6 * float(event.profile.end - event.profile.start)
+
+    def milliseconds(self) -> float:
+        """Of the fastest of some launches."""
+        times = [self._once()]
+        while len(times) < _LAUNCHES and sum(times) < 1e3 * _SECONDS:
+            times.append(self._once())
+        return min(times)
+
+    def met(self) -> Numbers:
+        """What the rays have met, shape (13, count)."""
+        found = np.empty((MET_NUMBERS, self._count + STATE_PADDING), self._trial.precision)
+        with self._trial.device.failures("marching"):
+            cl.enqueue_copy(self._trial.device.queue, found, self._arguments[1])
+        return found[:, : self._count].astype(np.float64)
 
 
 def _settings(chain: Chain, precision: Precision) -> npt.NDArray[np.void]:

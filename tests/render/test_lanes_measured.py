@@ -4,20 +4,22 @@ from __future__ import annotations
 
 import dataclasses
 import os
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from clfractal.device import cache, child, select, tune
+from clfractal.device import cache, child, isolate, select, tune
 from clfractal.device.select import Device, choose
+from clfractal.device.structs import Precision
 from clfractal.engine.prepare import prepare
 from clfractal.errors import DeviceError
 from clfractal.formulas.catalog import load_chain
 from clfractal.integrators import lanes
 from clfractal.integrators.lanes import best_lanes, is_measured, march_reports, rule_of
-from clfractal.integrators.trial import RULES, Rule, march
+from clfractal.integrators.trial import RULES, Marcher, Rule
 from clfractal.scene.load import load_scene
 from tests.portability.lane_counts import accepted_in_use
 
@@ -46,10 +48,45 @@ def without_8_16(request: dict[str, Any]) -> dict[str, Any]:
     return {"fault": "nonsense" if request["lanes"] > 4 else ""}
 
 
+_RIGGED = {1: (9, 9), 4: (1, 1), 8: (4, 6), 16: (2, 8)}
+
+
 def rigged_job(request: dict[str, Any]) -> dict[str, Any]:
     """16 lanes are the fastest by a scalar rule, and 8 by the Jacobian."""
-    scalar, jacobian = {1: (9, 9), 4: (1, 1), 8: (4, 6), 16: (2, 8)}[request["lanes"]]
-    return {"scalar": scalar, "jacobian": jacobian}
+    scalar, jacobian = zip(*(_RIGGED[lanes] for lanes in request["lanes"]), strict=True)
+    return {"scalar": scalar, "jacobian": jacobian, "steady": True}
+
+
+def busy_job(request: dict[str, Any]) -> dict[str, Any]:
+    """The same, beside other work."""
+    return {**rigged_job(request), "steady": False}
+
+
+def one_by_one_job(request: dict[str, Any]) -> dict[str, Any]:
+    """The driver cannot march with several lane counts in one process."""
+    if len(request["lanes"]) > 1:
+        raise DeviceError("no more programs")
+    return rigged_job(request)
+
+
+def all_accepted(
+    device: Device, precision: str, lane_counts: Sequence[int], **more: object
+) -> tuple[tune.LaneReport, ...]:
+    return tuple(tune.LaneReport(count, "") for count in lane_counts)
+
+
+def recorded(monkeypatch: pytest.MonkeyPatch) -> list[str]:
+    """What children do from now on."""
+    doings: list[str] = []
+    real = isolate.run
+
+    def run(*arguments: Any, doing: str, **more: Any) -> Any:
+        if "folder" not in more:  # it calls itself with one
+            doings.append(doing)
+        return real(*arguments, doing=doing, **more)
+
+    monkeypatch.setattr(isolate, "run", run)
+    return doings
 
 
 @pytest.fixture
@@ -92,6 +129,34 @@ def test_a_measurement_is_remembered(device: Device, monkeypatch: pytest.MonkeyP
 
 
 @pytest.mark.usefixtures("rigged")
+def test_what_a_busy_device_tells_is_not_for_ever(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
+    """This process takes what it has found; the next one measures again."""
+    with monkeypatch.context() as patch:
+        patch.setattr(lanes, "JOB", f"{_HERE}:busy_job")
+        assert best_lanes(device, "float32", "jacobian") == 8
+        assert is_measured(device, "float32")
+        lanes._reports.clear()
+        assert not is_measured(device, "float32")
+        assert cache.recall(select.SPEEDS) == {}
+    march_reports(device, "float32")
+    lanes._reports.clear()
+    assert is_measured(device, "float32")
+    assert device.info.key in cache.recall(select.SPEEDS)
+
+
+@pytest.mark.usefixtures("rigged")
+def test_a_driver_that_can_only_do_one_after_the_other(
+    device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No lane count is at fault, and what was measured one by one is not for ever."""
+    monkeypatch.setattr(lanes, "JOB", f"{_HERE}:one_by_one_job")
+    assert [report.lanes for report in march_reports(device, "float32")] == [16, 8]
+    assert best_lanes(device, "float32", "jacobian") == 8
+    lanes._reports.clear()
+    assert not is_measured(device, "float32")
+
+
+@pytest.mark.usefixtures("rigged")
 def test_a_first_picture_is_not_measured_for(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """Its lanes fit the registers, and were tried; a process keeps them, the next one has those that were measured."""
     told: list[str] = []
@@ -125,8 +190,22 @@ def test_what_computes_wrongly_is_no_guess(
 def test_a_lane_count_on_which_the_driver_aborts_is_left_out(
     device: Device, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setenv(child.TEST_ABORT, "marching with 16 lanes")
-    assert best_lanes(device, "float32") == 8
+    """It takes those with it that share its process; each is marched with alone then, and the sound ones together."""
+    monkeypatch.setenv(child.TEST_ABORT, '"lanes": [16')
+    monkeypatch.setattr(tune, "lane_reports", all_accepted)
+    monkeypatch.setattr(tune, "promising", lambda device: ((16, 8, 1),))
+    with monkeypatch.context() as patch:
+        doings = recorded(patch)
+        assert best_lanes(device, "float32") == 8
+    assert doings == [
+        "marching with 16 and 8 and 1 lanes",
+        *(f"marching with {lanes} lanes" for lanes in (16, 8, 1)),
+        "marching with 8 and 1 lanes",
+    ]
+    lanes._reports.clear()
+    assert [report.lanes for report in march_reports(device, "float32")] == [8, 1]
+    facts = cache.recall("marches").values()
+    assert {fact["lanes"]: bool(fact["fault"]) for fact in facts} == {16: True, 8: False, 1: False}
 
 
 @pytest.mark.usefixtures("rigged")
@@ -174,7 +253,8 @@ def test_formulas_march_by_their_scalar_rule_if_all_have_one() -> None:
 def test_what_is_marched_is_the_object(device: Device, rule: Rule) -> None:
     """With every lane count the same: rays that meet the set, and places that the light does not reach."""
     met = {
-        count: march(device, "float32", count, rule, 64)[1] for count in accepted_in_use(device, "float32")
+        count: Marcher(device, "float32", count, rule, 64).picture()
+        for count in accepted_in_use(device, "float32")
     }
     wanted = next(iter(met.values()))
     hit = wanted[..., 0] > 0
@@ -200,3 +280,16 @@ def test_long_work_waits_for_the_measurement(
     job = prepare(scene, device, precision="float32", samples=samples, pictures=pictures)
     assert is_measured(device, "float32") == waits
     assert job.lanes == (8 if waits else tune.first_lanes(device, "float32"))
+
+
+@pytest.mark.parametrize("precision", ["float32", "float64"])
+def test_the_job_itself(device: Device, precision: Precision) -> None:
+    """Its answer has a time of each lane count by each rule; whether they are steady hangs on the machine."""
+    counts = accepted_in_use(device, precision)[-2:]
+    request = {"device": [device.info.index, device.info.key], "lanes": counts, "precision": precision}
+    answer = lanes.march_job(request)
+    assert set(answer) == {*RULES, "steady"}
+    assert isinstance(answer["steady"], bool)
+    for rule in RULES:
+        assert len(answer[rule]) == len(counts)
+        assert min(answer[rule]) > 0
