@@ -9,7 +9,7 @@ The same moves are keys of a scene's camera (`orbit`, `roll`, `shift`, `frame`).
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 from clfractal.errors import arguments
 from clfractal.scene.model import Scene
@@ -74,16 +74,19 @@ def shift(scene: Scene, *, right: float = 0.0, up: float = 0.0, forward: float =
     return _with(scene, shift={"right": right, "up": up, "forward": forward})
 
 
-def frame(scene: Scene) -> Scene:
-    """The camera, without a turn, where the bounds of the set fill 90 % of the picture's smaller side.
+def frame(scene: Scene, what: Literal["all", "seen"] = "all") -> Scene:
+    """The camera, without a turn, where something fills 90 % of the picture's width or height; its middle is the target.
 
-    The bounds' middle becomes the target. Bounds hold all of the set, and may be larger than it is. Of a volume with a box
-    of its own, or a grid from a file, the corners fill 90 % of the picture's width or height.
+    Args:
+        what: `all`: the bounds of the set, of which the ball fills the smaller side. They hold all of the set, and may be
+            larger than it is. Of a volume with a box of its own, or a grid from a file, its corners. `seen`: what is seen,
+            the set and the objects that have an end, as far as planes leave them.
 
     Raises:
         FormulaError: the scene's formula has no bounds, because it is wrong.
+        SceneError: another word.
     """
-    return _with(scene, frame="all")
+    return _with(scene, frame=arguments.word("what", what, ("all", "seen")))
 
 
 def _with(scene: Scene, **words: Any) -> Scene:

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self, cast
 
 from pydantic import Field
 
-from clfractal.scene.stance import LARGEST, Extent, angles, axes, framing, orbited, rolled, shifted
+from clfractal.scene.stance import LARGEST, Framed, angles, axes, framing, orbited, rolled, shifted
 from clfractal.schema.base import (
     Angle,
     Coordinate,
@@ -72,10 +72,11 @@ class CameraBase(Section):
     orbit: Orbit | None = Field(
         default=None, exclude=True, description="angles and distance round the target, instead of position"
     )
-    frame: Literal["all"] | None = Field(
+    frame: Literal["all", "seen"] | None = Field(
         default=None,
         exclude=True,
-        description="all: target and distance are chosen so that the bounds, or a volume's own box, fill 90 % of it",
+        description="target and distance are chosen so that 90 % of the picture's width or height are filled: all: by the"
+        " bounds, or a volume's own box; seen: by what is seen",
     )
     roll: Angle | None = Field(
         default=None,
@@ -101,7 +102,7 @@ class CameraBase(Section):
             # (Otherwise the scene does it, which knows the bounds.)
             self._take_shift()
 
-    def framed(self, shown: Extent, aspect: float) -> Self:
+    def framed(self, shown: Framed, aspect: float) -> Self:
         """The camera with its `frame` and `shift` done.
 
         Args:
@@ -112,8 +113,8 @@ class CameraBase(Section):
             SceneError: `shift` leads out of the range of coordinates.
         """
         fov = getattr(self, "fov", None)
-        position, height = framing(axes(self.position, self.target, self.up), shown, aspect, fov)
-        update = {"position": position, "target": shown.center, "frame": None}
+        position, target, height = framing(axes(self.position, self.target, self.up), shown, aspect, fov)
+        update = {"position": position, "target": target, "frame": None}
         found = self.model_copy(update=update if height is None else {**update, "height": height})
         found._remember(self.said)
         return found

@@ -29,7 +29,7 @@ from clfractal.scene.objects import FormulaObject, Objects, VolumeObject, ball_a
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.reads import Reads, is_data, is_table, section_of
 from clfractal.scene.renderer import Renderer
-from clfractal.scene.stance import Extent
+from clfractal.scene.stance import Extent, Framed
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
@@ -106,7 +106,7 @@ class Scene(Section):
 
     @model_validator(mode="after")
     def _frame_cameras(self, info: ValidationInfo) -> Self:
-        """Cameras with `frame: all` get their places, those of views and bookmarks too.
+        """Cameras with a `frame` get their places, those of views and bookmarks too.
 
         What is shown may stand in a file: the context tells where that is looked for.
         """
@@ -140,7 +140,22 @@ class Scene(Section):
     def _framed(self, camera: AnyCamera) -> AnyCamera:
         if camera.frame is None:
             return camera
-        return camera.framed(self.extent, self.image.width / self.image.height)
+        shown = self.extent if camera.frame == "all" else self._seen_from(camera)
+        return camera.framed(shown, self.image.width / self.image.height)
+
+    def _seen_from(self, camera: AnyCamera) -> Framed:
+        """What `frame: seen` frames; of clouds and flat pictures all that they can show."""
+        renderer = self.renderer
+        if isinstance(renderer, VolumeRenderer) and (
+            renderer.file is not None or renderer.transfer.opacity is not None
+        ):
+            return self.extent
+        if renderer.is_flat:
+            return self.extent
+        # Here, because NumPy takes long to import.
+        from clfractal.scene.seen import Seen
+
+        return Seen(self, camera.position, self.extent)
 
     @property
     def has_set(self) -> bool:

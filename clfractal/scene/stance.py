@@ -7,6 +7,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import atan2, degrees, hypot, inf, radians, tan
+from operator import mul
+from typing import ClassVar, Protocol, TypeAlias
 
 from clfractal.schema.base import Vector, cos_sin, cross, dot, length, minus, turn, unit
 
@@ -70,10 +72,37 @@ def shifted(
     return _sum((1.0, point), (forward, along[0]), (right, along[1]), (up, along[2]))
 
 
+Along: TypeAlias = tuple[Vector, Vector, Vector]
+"""A camera's `axes`."""
+Ways: TypeAlias = Sequence[Vector]
+"""Directions of any length, in parts of a camera's axes: in the direction of view, to the right, to the top; in pairs
+of opposite sides."""
+
+
+class Framed(Protocol):
+    """What a camera shows all of.
+
+    Attributes:
+        center, radius: of a ball around it, scene units.
+        has_middle: whether the centre is its middle, and shall be that of the picture.
+    """
+
+    has_middle: ClassVar[bool]
+
+    @property
+    def center(self) -> Vector: ...
+    @property
+    def radius(self) -> float: ...
+
+    def reaches(self, along: Along, ways: Ways) -> Sequence[float]:
+        """How far it reaches: of each of these ways the largest product with a way from `center` to a part of it."""
+
+
 @dataclass(frozen=True, slots=True)
 class Extent:
     """What is to be seen: a ball, or the block, from its middle to these corners, that the ball goes round; scene units."""
 
+    has_middle: ClassVar[bool] = True
     center: Vector
     radius: float
     corners: tuple[Vector, ...] | None = None
@@ -90,13 +119,21 @@ class Extent:
         corners = tuple(_sum(*zip(signs, edges, strict=True)) for signs in product((-0.5, 0.5), repeat=3))
         return cls(center, max(length(corner) for corner in corners), corners)
 
+    def reaches(self, along: Along, ways: Ways) -> list[float]:
+        """As of everything that is framed."""
+        if self.corners is None:
+            return [self.radius * hypot(*way) for way in ways]
+        corners = [tuple(dot(corner, axis) for axis in along) for corner in self.corners]
+        return [max(sum(map(mul, way, corner)) for corner in corners) for way in ways]
+
 
 def framing(
-    along: tuple[Vector, Vector, Vector], shown: Extent, aspect: float, fov: float | None
-) -> tuple[Vector, float | None]:
-    """Where a camera stands that shows a ball in 90 % of the picture's smaller side, its middle being the target.
+    along: Along, shown: Framed, aspect: float, fov: float | None
+) -> tuple[Vector, Vector, float | None]:
+    """Where a camera stands that shows all of something in 90 % of the picture's height or width, whichever it fills first.
 
-    Of a block the corners are seen: 90 % of the picture's height or width, whatever it fills first.
+    The sides of that part of the picture touch it: they are planes through the eye, which know of what they touch but how
+    far it reaches in their direction. A ball fills 90 % of the smaller side.
 
     Args:
         along: the camera's `axes`.
@@ -104,24 +141,26 @@ def framing(
         fov: vertical angle of view, degrees; None: an orthographic camera.
 
     Returns:
-        Its position, and the height of an orthographic camera's picture, or None. Where the ball is too large for the
-        range of coordinates, the camera is as far away as it can be.
+        Its position, its target, which is in the middle of what is shown, and the height of an orthographic camera's
+        picture, or None. Where that is too large for the range of coordinates, the camera is as far away as it can be.
     """
-    radius, back = shown.radius, _sum((-1.0, along[0]))
-    narrow = FILLED * min(1.0, aspect)
-    # Half of the picture's height at the depth of the middle that it needs, and at depth 1 that it has.
-    needed, slope = radius / narrow, 0.0 if fov is None else tan(radians(fov) / 2)
-    # The outline of a ball is where rays touch it: tan(angle) = radius / sqrt(distance^2 - radius^2).
-    distance = _CLEAR * radius if fov is None else radius * hypot(1.0, 1.0 / (narrow * slope))
-    if shown.corners is not None:
-        corners = [tuple(dot(corner, each) for each in along) for corner in shown.corners]
-        halves = [max(abs(up), abs(right) / aspect) / FILLED for _, right, up in corners]
-        needed = max(halves)
-        if fov is not None:
-            distance = max(half / slope - ahead for (ahead, _, _), half in zip(corners, halves, strict=True))
+    slope = 1.0 if fov is None else tan(radians(fov) / 2)
+    ahead = 0.0 if fov is None else -1.0
+    # Directions across the picture's sides, as long as one goes ahead for each step to the side.
+    across, rise = 1 / (FILLED * aspect * slope), 1 / (FILLED * slope)
+    ways = ((ahead, across, 0.0), (ahead, -across, 0.0), (ahead, 0.0, rise), (ahead, 0.0, -rise))
+    right, left, top, bottom, far, near = shown.reaches(along, (*ways, (1.0, 0.0, 0.0), (-1.0, 0.0, 0.0)))
+    if shown.has_middle:
+        right, top, far = left, bottom, near = max(right, left), max(top, bottom), 0.0
+    middle = (far - near) / 2
+    aside, above = (right - left) / 2 / across, (top - bottom) / 2 / rise
+    target = shifted(shown.center, along, middle, aside, above)
+    # From the target: what is needed at depth 1, or of the picture's half height.
+    needed, back = max(right + left, top + bottom) / 2, _sum((-1.0, along[0]))
     height = min(max(2 * needed, 1e-12), LARGEST) if fov is None else None
-    distance = min(max(distance, least_distance(shown.center)), room(shown.center, back))
-    return _sum((1.0, shown.center), (distance, back)), height
+    distance = _CLEAR * shown.radius if fov is None else needed + middle
+    distance = min(max(distance, least_distance(target)), room(target, back))
+    return _sum((1.0, target), (distance, back)), target, height
 
 
 def least_distance(target: Iterable[float]) -> float:

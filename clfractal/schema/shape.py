@@ -3,7 +3,7 @@
 import math
 from abc import abstractmethod
 from functools import reduce
-from typing import Annotated, Any, ClassVar, Literal, TypeAlias
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
 from pydantic import Field
 
@@ -11,6 +11,12 @@ from clfractal.schema.base import Angle, Direction, Length, Position, Vector, le
 from clfractal.schema.fields import SCALE
 from clfractal.schema.kinds import Element, members
 from clfractal.schema.names import MaterialName
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    Floats: TypeAlias = NDArray[np.float64]
 
 Ball: TypeAlias = tuple[Vector, float]
 """A centre and a radius, scene units."""
@@ -74,6 +80,10 @@ class Simple(Joined):
     def holds(self, point: Vector) -> bool:
         """Whether a point is inside."""
 
+    @abstractmethod
+    def away(self, points: "Floats") -> "Floats":
+        """How far points of shape (n, 3) are from it, scene units, or less than that; below 0 inside."""
+
 
 class Level(ObjectBase):
     """A surface without an end, seen from both sides."""
@@ -122,6 +132,14 @@ class Solid(Simple):
             for axis, long in ((axis, math.hypot(*axis)) for axis in self.axes)
         )
         return (x, y, z)
+
+    def own_places(self, points: "Floats") -> "tuple[Floats, Floats]":
+        """Points of shape (n, 3) along its own axes from its middle, scene units, and the lengths of `axes`."""
+        import numpy as np
+
+        axes = np.array(self.axes)
+        long = np.linalg.norm(axes, axis=1)
+        return (points - self.position) @ (axes / long[:, None]).T, long
 
 
 def solids() -> tuple[type[Solid], ...]:

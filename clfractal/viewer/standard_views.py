@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from clfractal.errors import SceneError
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
-from clfractal.scene.stance import LARGEST, Extent, framing, least_distance, room
+from clfractal.scene.stance import LARGEST, Framed, framing, least_distance, room
 from clfractal.viewer.pointer import Size, vector
 from clfractal.viewer.pose import C, pose_of, stood
 
@@ -29,7 +29,7 @@ _LEAST_HEIGHT, _LEAST_FOV, _MOST_FOV = 1e-12, 1e-6, 179.9
 
 
 @np.errstate(all="ignore")
-def frame_all(camera: C, shown: Extent, size: Size) -> C:
+def frame_all(camera: C, shown: Framed, size: Size) -> C:
     """The camera, moved without a turn so that it shows all of something, whose middle is the target; see `framing`.
 
     Where that is too large for the range of coordinates, the camera is as far away as it can be.
@@ -37,12 +37,12 @@ def frame_all(camera: C, shown: Extent, size: Size) -> C:
     fov = camera.fov if isinstance(camera, PerspectiveCamera) else None
     pose = pose_of(camera)
     along = (vector(pose.axis), vector(pose.side), vector(pose.up))
-    position, height = framing(along, shown, size[0] / size[1], fov)
-    return stood(camera, position, shown.center, **({} if height is None else {"height": height}))
+    position, target, height = framing(along, shown, size[0] / size[1], fov)
+    return stood(camera, position, target, **({} if height is None else {"height": height}))
 
 
 @np.errstate(all="ignore")
-def axis_view(camera: C, side: Side, size: Size, shown: Extent | None = None) -> C:
+def axis_view(camera: C, side: Side, size: Size, shown: Framed | None = None) -> C:
     """The camera, looking from one of the six sides.
 
     Args:

@@ -88,6 +88,18 @@ def check_inside(known: Known) -> None:
     assert held.sum() > 20
     assert (held == (far < 0))[clear].all()
     assert (np.linalg.norm(points[held] - it.ball[0], axis=-1) <= it.ball[1]).all()
+    away = it.away(points)
+    assert ((away < 0) == held)[clear].all()
+    check_away(it, points[~held], far[~held])
+
+
+def check_away(it: Solid, points: Floats, far: Floats) -> None:
+    """How far it says that points outside are away: no step of that length comes in, and it is no small part of it."""
+    away = it.away(points)
+    ways = np.random.default_rng(6).normal(size=points.shape)
+    ways /= np.linalg.norm(ways, axis=1)[:, None]
+    assert (it.away(points + 0.999 * away[:, None] * ways) >= 0).all()
+    assert (4 * away >= far - 1e-12).all()
 
 
 def _axes(it: Solid) -> Floats:

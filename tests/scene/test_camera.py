@@ -230,7 +230,7 @@ def test_views_and_bookmarks_have_their_own_frames() -> None:
 frame: all, orbit: {distance: 3} => camera.orbit.distance: is chosen by camera.frame; remove one of them
 orbit: {elevation: 91} => camera.orbit.elevation: must be at most 90, got 91
 orbit: {azimut: 9} => camera.orbit: unknown key 'azimut'; did you mean 'azimuth'?
-frame: some => camera.frame: must be all, got 'some'
+frame: some => camera.frame: must be all or seen, got 'some'
 roll: x => camera.roll: must be a number, got 'x'
 position: [0, 1000000, 0], shift: {forward: -9} => camera.shift: must leave the camera's coordinates below 1,000,000
 target: [1000000, 0, 0], orbit: {azimuth: 90, elevation: 0, distance: 1}

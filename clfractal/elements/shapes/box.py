@@ -1,13 +1,16 @@
 """A box as an object."""
 
 import math
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Vector
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Sides, Solid
+
+if TYPE_CHECKING:
+    from clfractal.schema.shape import Floats
 
 
 class BoxObject(Solid):
@@ -31,3 +34,10 @@ class BoxObject(Solid):
     def holds(self, point: Vector) -> bool:
         """Whether a point is inside."""
         return max(abs(x) for x in self.own_place(point)) < 1
+
+    def away(self, points: "Floats") -> "Floats":
+        """As of every shape."""
+        import numpy as np
+
+        own, long = self.own_places(points)
+        return np.asarray((np.abs(own) - long).max(axis=1))

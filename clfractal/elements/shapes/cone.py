@@ -1,13 +1,16 @@
 """A cone as an object."""
 
 from math import hypot
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Amount, Length, Vector
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
+
+if TYPE_CHECKING:
+    from clfractal.schema.shape import Floats
 
 
 class ConeObject(Solid):
@@ -41,3 +44,16 @@ class ConeObject(Solid):
         x, y, z = self.own_place(point)
         lower, upper, _ = self.form
         return abs(z) < 1 and hypot(x, y) < ((1 - z) * lower + (1 + z) * upper) / 2
+
+    def away(self, points: "Floats") -> "Floats":
+        """As of every shape."""
+        import numpy as np
+
+        own, long = self.own_places(points)
+        x, y, z = (own / long).T
+        lower, upper, _ = self.form
+        out, wide = np.hypot(x, y), long[:2].min()
+        # Its side leans: a step out of it is longer than the way to it. Beyond its rims the cylinder around it is nearer.
+        lean = np.hypot(1 / wide, (upper - lower) / 2 / long[2])
+        side = np.maximum((out - ((1 - z) * lower + (1 + z) * upper) / 2) / lean, (out - 1) * wide)
+        return np.asarray(np.maximum(side, np.abs(own[:, 2]) - long[2]))

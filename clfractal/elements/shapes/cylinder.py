@@ -1,12 +1,15 @@
 """A cylinder as an object."""
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Length, Vector
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
+
+if TYPE_CHECKING:
+    from clfractal.schema.shape import Floats
 
 
 class CylinderObject(Solid):
@@ -31,3 +34,11 @@ class CylinderObject(Solid):
         """Whether a point is inside."""
         x, y, z = self.own_place(point)
         return x * x + y * y < 1 and abs(z) < 1
+
+    def away(self, points: "Floats") -> "Floats":
+        """As of every shape."""
+        import numpy as np
+
+        own, long = self.own_places(points)
+        around = np.hypot(*(own[:, :2] / long[:2]).T) - 1
+        return np.asarray(np.maximum(around * long[:2].min(), np.abs(own[:, 2]) - long[2]))

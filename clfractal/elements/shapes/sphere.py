@@ -1,12 +1,15 @@
 """A ball as an object."""
 
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Length, Vector, length
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
+
+if TYPE_CHECKING:
+    from clfractal.schema.shape import Floats
 
 
 class SphereObject(Solid):
@@ -29,3 +32,14 @@ class SphereObject(Solid):
     def holds(self, point: Vector) -> bool:
         """Whether a point is inside."""
         return length(self.own_place(point)) < 1
+
+    def away(self, points: "Floats") -> "Floats":
+        """As of every shape; from far away that of a ball in the place of an ellipsoid."""
+        import numpy as np
+
+        own, long = self.own_places(points)
+        out = np.linalg.norm(own / long, axis=1)
+        # To the first order near its surface, and never more than the longest axis allows.
+        slope = np.maximum(np.linalg.norm(own / long**2, axis=1), 1e-300)
+        near = np.where(out > 0, out * (out - 1) / slope, -long.min())
+        return np.asarray(np.clip(near, (out - 1) * long.min(), (out - 1) * long.max()))

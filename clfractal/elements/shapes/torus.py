@@ -1,13 +1,16 @@
 """A torus as an object."""
 
 from math import hypot
-from typing import Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 from pydantic import Field
 
 from clfractal.schema.base import Length, Vector, problem, rule
 from clfractal.schema.fields import SCALE
 from clfractal.schema.shape import Solid
+
+if TYPE_CHECKING:
+    from clfractal.schema.shape import Floats
 
 
 class TorusObject(Solid):
@@ -49,3 +52,13 @@ class TorusObject(Solid):
         x, y, z = self.own_place(point)
         ring, tube, _ = self.form
         return (hypot(x, y) - ring) ** 2 + (tube * z) ** 2 < tube**2
+
+    def away(self, points: "Floats") -> "Floats":
+        """As of every shape."""
+        import numpy as np
+
+        own, long = self.own_places(points)
+        x, y, z = (own / long).T
+        ring, tube, _ = self.form
+        # (In units of the distance from its middle to its rim, in which its tube is round.)
+        return np.asarray((np.hypot(np.hypot(x, y) - ring, tube * z) - tube) * min(*long[:2], long[2] / tube))
