@@ -10,7 +10,7 @@ from clfractal.scene.renderer import Renderer
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.mapped import maps_of
-from clfractal.schema.quantity import ColoringKind, colorings
+from clfractal.schema.quantity import colorings
 from clfractal.schema.shape import Joined
 
 
@@ -32,12 +32,12 @@ def _shows_a_file(renderer: Renderer) -> bool:
 
 def _asking(scene: Scene) -> Iterator[tuple[str, str, str]]:
     """Where anything needs the formula, what that is and does, and what to do about it."""
-    if _needs(scene.coloring.kind):
-        *others, last = (kind.tag for kind in colorings() if not _needs(kind))
+    if scene.coloring.kind.needs_set():
+        *others, last = (kind.tag for kind in colorings() if not kind.needs_set())
         yield "coloring.by", f"{scene.coloring.by} needs", f"use {', '.join(others)} or {last}"
     for name, material in scene.materials.items():
         for key, each in maps_of(material):
-            if each.kind is not None and _needs(each.kind):
+            if each.kind is not None and each.kind.needs_set():
                 yield f"materials.{name}.{key}.by", f"{each.by} needs", "use another quantity, or a texture"
     if scene.glow is not None:
         yield "glow", "needs", "remove it"
@@ -53,8 +53,3 @@ def _asking(scene: Scene) -> Iterator[tuple[str, str, str]]:
             yield f"objects.{name}.type", "formula joins its set to that of", "make it the scene's own"
         elif isinstance(item, Joined) and item.join != "union":
             yield f"objects.{name}.join", f"{item.join} needs", "remove it, and the object stands for itself"
-
-
-def _needs(kind: type[ColoringKind]) -> bool:
-    """Whether a quantity is known of a formula's set only."""
-    return kind.known == "by_formula" or kind.tag == "iterations"

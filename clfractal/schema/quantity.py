@@ -26,6 +26,7 @@ class ColoringKind(Kind):
         of_material: whether the colour is the material's.
         of_volumes: whether it colours volumes, whose values have colours otherwise.
         of_surface: whether it follows what the surface itself is around a place, its normals and escape counts.
+        counts_applications: whether it counts how often the formula is applied.
         of_objects: whether the formula has an answer on objects beside the set.
         uses_palette: whether it is a number, and the palette's colour there.
         ways: of `along`, those that it may be measured in.
@@ -43,6 +44,7 @@ class ColoringKind(Kind):
     of_material: ClassVar[bool] = False
     of_volumes: ClassVar[bool] = False
     of_surface: ClassVar[bool] = False
+    counts_applications: ClassVar[bool] = False
     of_objects: ClassVar[bool] = False
     uses_palette: ClassVar[bool] = True
     ways: ClassVar[tuple[str, ...]] = ("view", "normal", "reflection")
@@ -51,6 +53,11 @@ class ColoringKind(Kind):
     hint: ClassVar[str] = ""
     unit: ClassVar[str] = ""
     usual_scale: ClassVar[str] = ""
+
+    @classmethod
+    def needs_set(cls) -> bool:
+        """Whether it is known of a formula's set only."""
+        return cls.known == "by_formula" or cls.counts_applications
 
     @staticmethod
     def own_colors(normals: Any, plain: Any) -> Any:

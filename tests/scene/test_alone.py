@@ -12,6 +12,7 @@ from clfractal.errors import FormulaError
 from clfractal.files.volume_file import Volume, write_volume
 from clfractal.formulas.catalog import names
 from clfractal.scene.load import dump_scene, load_scene
+from clfractal.schema.kinds import members
 from tests.scene.errors import cases, error_of, marked
 from tests.scenes import HEAD
 from tests.shell import InProcess
@@ -85,6 +86,11 @@ def test_none_is_no_name_of_a_file(tmp_path: Path) -> None:
     assert not load_scene(ALONE, folder=tmp_path).has_set
     assert not load_scene(HEAD.replace("mandelbulb", "none"), folder=tmp_path).has_set
     assert "none" not in names()
+
+
+def test_kinds_of_colours_that_need_a_set() -> None:
+    needing = {"trap", "iterations", "thickness", "curvature", "layer_distance"}
+    assert {kind.tag for kind in members("colorings") if kind.needs_set()} == needing
 
 
 def test_of_none_nothing_can_be_asked() -> None:

@@ -8,5 +8,6 @@ class IterationsColoring(ColoringKind):
 
     place = 30
     of_surface = True
+    counts_applications = True
     unit = "applications"
     usual_scale = "0.02 to 0.2"
