@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +13,9 @@ import pytest
 
 import clfractal
 from clfractal.device.select import Device
+from clfractal.engine.job import Job
+from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.run import Result, WorkItem
 from clfractal.files.exr import read_exr
 from clfractal.integrators.surface import PROGRAMS, program_texts
 from clfractal.integrators.waves import surface_stages
@@ -104,19 +110,52 @@ def test_nothing_that_knows_a_formula_is_launched(device: Device, way: str) -> N
         }
 
 
-def test_a_picture_is_a_scene_again_and_resume_begins_where_there_is_no_work(
-    clf: InProcess, tmp_path: Path
-) -> None:
-    scene, whole = tmp_path / "alone.yaml", tmp_path / "whole.exr"
+def write_alone(folder: Path) -> Path:
+    """A scene of four tiles."""
+    scene = folder / "alone.yaml"
     scene.write_text(
         "version: 1\nformula: none\ncamera: {position: [0, -3, 1]}\nimage: {width: 40, height: 36}\n"
         "objects: {floor: {type: plane, position: [0, 0, -0.5]}, ball: {}}\nrenderer: {samples: 2}\n"
     )
-    works(clf("render", scene, "-o", whole, "--quiet"))
+    return scene
+
+
+def check_same(path: Path, whole: Path) -> None:
+    for name in "RGBAZ":
+        np.testing.assert_array_equal(read_exr(path)[0][name], read_exr(whole)[0][name])
+
+
+def test_a_picture_is_a_scene_again(clf: InProcess, tmp_path: Path) -> None:
+    whole, again = tmp_path / "whole.exr", tmp_path / "again.exr"
+    works(clf("render", write_alone(tmp_path), "-o", whole, "--quiet"))
     assert not clfractal.load_scene(whole).has_set
-    again, resumed = tmp_path / "again.exr", tmp_path / "resumed.exr"
     works(clf("render", whole, "-o", again, "--quiet"))
-    works(clf("render", scene, "-o", resumed, "--quiet", "--resume"))
-    for each in (again, resumed):
-        for name in "RGBAZ":
-            np.testing.assert_array_equal(read_exr(each)[0][name], read_exr(whole)[0][name])
+    check_same(again, whole)
+
+
+@pytest.mark.parametrize("left", [0, 1, 3])
+def test_resume_goes_on_with_the_work_that_was_left(
+    left: int, clf: InProcess, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    scene, whole, resumed = write_alone(tmp_path), tmp_path / "whole.exr", tmp_path / "resumed.exr"
+    works(clf("render", scene, "-o", whole, "--quiet"))
+    if left:
+        real = LocalExecutor.execute
+
+        def fails(
+            executor: LocalExecutor, job: Job, items: Iterable[WorkItem], *rest: Any
+        ) -> Iterator[Result]:
+            """After so many tiles."""
+            for item in items:
+                yield from real(executor, job, [replace(item, tiles=item.tiles[:left])], *rest)
+            raise clfractal.DeviceError("the device failed")
+
+        with monkeypatch.context() as patch:
+            patch.setattr(LocalExecutor, "execute", fails)
+            assert clf("render", scene, "-o", resumed, "--quiet").status == 3
+        assert not resumed.exists()
+    stats = tmp_path / "stats.json"
+    works(clf("render", scene, "-o", resumed, "--quiet", "--resume", "--stats", stats))
+    told = json.loads(stats.read_text())
+    assert (told["tiles"], told["tiles_resumed"]) == (4, left)
+    check_same(resumed, whole)
