@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from clfractal.cli.shell import Shell
-from clfractal.errors import ClfractalError, FileError, FormulaError, Where
+from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.files.fragments import flow_text
-from clfractal.formulas.nothing import NONE
+from clfractal.formulas.catalog import check_has_set
 from clfractal.scene.load import load_scene
 
 if TYPE_CHECKING:
@@ -76,10 +76,9 @@ def new_scene(name: str, formula: str | None, device: str | None, shell: Shell) 
     check_output(path, EXTENSIONS)
     _check_new(path)
     section = _formula(formula or "mandelbulb", path.parent)
-    if section.get("name") == NONE:
-        raise FormulaError("none is for scenes of objects alone; name a formula", Where("--formula"))
     try:
-        load_scene({"version": 1, "formula": section, "camera": {}}, folder=path.parent)
+        scene = load_scene({"version": 1, "formula": section, "camera": {}}, folder=path.parent)
+        check_has_set(scene.chain, Where("--formula"))
     except ClfractalError as error:
         if error.where.file is not None:
             raise

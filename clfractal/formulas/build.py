@@ -34,7 +34,17 @@ _KEYS = (
         "add",
         "degree",
     ),
-    *("bounds", "bailout", "distance_bailout", "step_scale", "slice", "shape", "derivative", "julia"),
+    *(
+        "bounds",
+        "bailout",
+        "distance_bailout",
+        "step_scale",
+        "slice",
+        "shape",
+        "derivative",
+        "julia",
+        "alone",
+    ),
 )
 _PARAMETER_KEYS = ("type", "default", "minimum", "maximum", "choices", "baked", "description")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
@@ -102,6 +112,7 @@ class _Builder:
             derivative=self._optional("derivative", (*everything, "dr", "added")),
             point_map=any(names_in(node) & uses_point for node in (*maps, *(node for _, node in let))),
             julia=self._julia(add),
+            alone=self._alone(),
             source=dict(self.data),
             description=self._text("description", ""),
         )
@@ -111,6 +122,12 @@ class _Builder:
         if not isinstance(value, str) or len(value) > 10_000:
             raise FormulaError("must be text", inside(self.where, key))
         return " ".join(value.split())
+
+    def _alone(self) -> bool:
+        value = self.data.get("alone", False)
+        if not isinstance(value, bool):
+            raise FormulaError("must be true or false", inside(self.where, "alone"))
+        return value
 
     def _variables(self) -> tuple[str, ...]:
         where = inside(self.where, "variables")

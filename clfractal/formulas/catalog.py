@@ -15,7 +15,6 @@ from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_fr
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.definition import Formula, inside
 from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.nothing import EMPTY, NONE
 from clfractal.formulas.own import check_inside, find_own, library_names
 from clfractal.formulas.turns import MAX_START
 
@@ -31,17 +30,15 @@ _CHAIN_KEYS = (
 
 @cache
 def names() -> tuple[str, ...]:
-    """The library's names, sorted: formulas and chains."""
-    return library_names()
+    """The library's names, sorted: formulas and chains that have a set (see `Formula.alone`)."""
+    return tuple(name for name in library_names() if not description(name).get("alone"))
 
 
 @cache
 def description(name: str) -> Mapping[str, Any]:
-    """A library file as plain data, or what `none` is; FormulaError with the nearest name for one that does not exist."""
-    if name == NONE:
-        return EMPTY
-    if name not in names():
-        raise FormulaError(unknown_name("formula", name, names()))
+    """A library file as plain data; FormulaError with the nearest name for one that does not exist."""
+    if name not in library_names():
+        raise FormulaError(unknown_name("formula", name, library_names()))
     return _read(folder("formulas/library") / f"{name}.yaml", f"{name}.yaml")[0]
 
 
@@ -76,8 +73,19 @@ def load_chain(formula: str | Path | Mapping[str, Any], parameters: Mapping[str,
     Raises:
         FormulaError, FileError: as `resolve`; and for `none`, of which nothing can be asked.
     """
-    if formula == NONE or (isinstance(formula, Mapping) and formula.get("name") == NONE):
-        raise FormulaError("none is for scenes of objects alone; name a formula")
+    chain = _chain_of(formula, parameters)
+    check_has_set(chain, Where())
+    return chain
+
+
+def check_has_set(chain: Chain, where: Where) -> None:
+    """Raises FormulaError for a formula whose set is empty."""
+    if chain.alone:
+        name = chain.first.formula.name
+        raise FormulaError(f"{name} is for scenes of objects alone; name a formula", where)
+
+
+def _chain_of(formula: str | Path | Mapping[str, Any], parameters: Mapping[str, Any] | None) -> Chain:
     spec: dict[str, Any] = {"parameters": parameters} if parameters else {}
     if isinstance(formula, Path) or (isinstance(formula, str) and formula.endswith((".yaml", ".yml"))):
         path = Path(formula)
@@ -227,8 +235,6 @@ class _Resolver:
             if not isinstance(entry, Mapping):
                 raise FormulaError("must be a mapping with name, file or inline", at)
             entry_key = _source_key(entry, at, (*_OPTIONS, *_TURNS))
-            if entry.get("name") == NONE:
-                raise FormulaError("none cannot be a member of a chain; remove it", inside(at, "name"))
             reader: _Resolver = self
             own = self._own(entry, at)
             if own is not None:
@@ -237,7 +243,11 @@ class _Resolver:
             if "chain" in entry_data:
                 raise FormulaError("a chain cannot hold another chain", inside(at, entry_key))
             merged = self._with_julia(entry, spec, entry_data)
-            links.append(reader._link(merged, at, entry_data, entry_place, entry_source))
+            link = reader._link(merged, at, entry_data, entry_place, entry_source)
+            if link.bound.formula.alone:
+                message = f"{link.bound.formula.name} cannot be a member of a chain; remove it"
+                raise FormulaError(message, inside(at, entry_key))
+            links.append(link)
             turns = {option: merged[option] for option in _TURNS if merged.get(option) is not None}
             sources.append({**entry_source, **_options(merged), **turns})
         radii = {

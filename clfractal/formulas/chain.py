@@ -111,6 +111,11 @@ class Chain:
         return self.links[self.first_index].bound
 
     @property
+    def alone(self) -> bool:
+        """Whether the set is empty; see `Formula`."""
+        return self.first.formula.alone
+
+    @property
     def size(self) -> int:
         """Components of z, 3 or 4."""
         return len(self.first.formula.variables)

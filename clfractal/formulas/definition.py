@@ -99,6 +99,7 @@ class Formula:
             before the application, with `added` 1 where C is the point and 0 elsewhere.
         point_map: the map or a `let` uses `point_<variable>`, the constant C.
         julia: the constant to add when none is given (only with `add: constant`).
+        alone: the set is empty, and no ray asks for it: the formula of scenes of objects alone.
         source: the mapping it was read from, as plain data.
     """
 
@@ -122,6 +123,7 @@ class Formula:
     derivative: Node | None
     point_map: bool
     julia: tuple[float, ...] | None
+    alone: bool
     source: Mapping[str, Any]
     description: str
 

@@ -11,7 +11,6 @@ from pathlib import Path
 
 from clfractal.errors import FileError, FormulaError, Where, unknown_name
 from clfractal.files.resources import folder
-from clfractal.formulas.nothing import NONE
 
 FOLDERS_VARIABLE = "CLFRACTAL_FORMULAS"
 FOLDER = "formulas"
@@ -19,7 +18,7 @@ _ENDINGS = (".yaml", ".yml")
 
 
 def library_names() -> tuple[str, ...]:
-    """The library's names, sorted."""
+    """All names of the library, sorted: nobody else's formulas may have them."""
     return tuple(sorted(path.stem for path in folder("formulas/library").glob("*.yaml")))
 
 
@@ -45,11 +44,11 @@ def own_files(beside: Path | None) -> Mapping[str, Path]:
         for path in map(each.joinpath, inside):
             if path.suffix in _ENDINGS and os.path.isfile(path):
                 found.setdefault(path.stem, path)
-    return {name: found[name] for name in sorted(found.keys() - {*library_names(), NONE})}
+    return {name: found[name] for name in sorted(found.keys() - {*library_names()})}
 
 
 def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
-    """The file of a formula that is not in the library; None for one that is, and for `none`.
+    """The file of a formula that is not in the library; None for one that is.
 
     A file in the folder beside the scene must lie within the scene's folder, links followed.
 
@@ -59,7 +58,7 @@ def find_own(name: str, beside: Path | None, where: Where) -> Path | None:
             folder.
     """
     library = library_names()
-    if name in library or name == NONE:
+    if name in library:
         return None
     try:
         files = own_files(beside)

@@ -4,11 +4,11 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from clfractal.formulas.nothing import NONE
 from clfractal.schema.base import Coordinate, Number, Section, check_one_of, problem, rule
 from clfractal.schema.fields import PLACE, WHOLE, Usual
 from clfractal.schema.hex_color import AlsoAs
 
+_NONE = "none"
 MAX_LINKS = 64
 MAX_LIVE = 32
 MOST_ITERATIONS = 1_000_000
@@ -78,11 +78,6 @@ class FormulaSpec(_Source):
             if self.chain is not None and getattr(self, key):
                 raise problem("belongs to the members of a chain, not to the chain", key)
 
-    @property
-    def is_none(self) -> bool:
-        """Whether there is no set: the scene shows objects alone."""
-        return self.name == NONE
-
     def mapping(self) -> dict[str, Any]:
         """Plain data with the given keys only; it loads back to an equal FormulaSpec."""
         plain: dict[str, Any] = self.model_dump(mode="json", exclude_none=True)
@@ -90,11 +85,11 @@ class FormulaSpec(_Source):
 
 
 def _word(value: Any) -> Any:
-    """The word `none` stands for the formula of that name."""
-    return {"name": NONE} if value == NONE else value
+    """The word `none` stands for the formula of that name, which says by itself that it has no set."""
+    return {"name": _NONE} if value == _NONE else value
 
 
-Formula = Annotated[FormulaSpec, AlsoAs(_word, {"const": NONE})]
+Formula = Annotated[FormulaSpec, AlsoAs(_word, {"const": _NONE})]
 
 
 def _without_empty(spec: dict[str, Any]) -> dict[str, Any]:

@@ -160,7 +160,7 @@ class Scene(Section):
     @property
     def has_set(self) -> bool:
         """Whether there is a set beside the objects: `formula: none` has none."""
-        return not self.formula.is_none
+        return not self.chain.alone
 
     @property
     def bounds(self) -> tuple[Vector, float]:

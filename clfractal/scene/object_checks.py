@@ -148,9 +148,10 @@ def _check_joined(scene: Scene) -> None:
             Where(path=f"objects.{names[MAX_FORMULAS]}.type"),
         )
     for name, each in scene.joined.items():
-        if isinstance(each, FormulaObject) and each.formula.is_none:
-            where = Where(path=f"objects.{name}.formula.name")
-            raise SceneError("none is for the scene's own formula; remove this object", where)
+        if isinstance(each, FormulaObject) and scene.joined_chains[name].alone:
+            title = scene.joined_chains[name].first.formula.name
+            where = Where(path=f"objects.{name}.formula.{next(iter(each.formula.mapping()))}")
+            raise SceneError(f"{title} is for the scene's own formula; remove this object", where)
         where = Where(path=f"objects.{name}.join")
         if isinstance(each, PlaneObject) and each.join == "smooth_union":
             raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)

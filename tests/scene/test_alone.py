@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.errors import FormulaError
+from clfractal.errors import ClfractalError, FormulaError, SceneError
 from clfractal.files.volume_file import Volume, write_volume
-from clfractal.formulas.catalog import names
+from clfractal.formulas.catalog import description, names
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.schema.kinds import members
 from tests.scene.errors import cases, error_of, marked
 from tests.scenes import HEAD
 from tests.shell import InProcess
 
+HEAD_DATA = {"version": 1, "camera": {}}
 ALONE = HEAD.replace("{name: mandelbulb}", "none")
 OTHER = "type: formula, formula: {name: hast}"
 
@@ -86,6 +87,20 @@ def test_none_is_no_name_of_a_file(tmp_path: Path) -> None:
     assert not load_scene(ALONE, folder=tmp_path).has_set
     assert not load_scene(HEAD.replace("mandelbulb", "none"), folder=tmp_path).has_set
     assert "none" not in names()
+
+
+def test_what_a_formula_says_of_itself_decides_and_not_its_name() -> None:
+    """Written into the scene, as pictures have it, it is the same; and any other formula may say so."""
+    inline = {**description("none"), "title": "Nobody"}
+    scene = load_scene({**HEAD_DATA, "formula": {"inline": inline}})
+    assert not scene.has_set
+    assert load_scene({**HEAD_DATA, "formula": {"inline": {**inline, "alone": False}}}).has_set
+    with pytest.raises(SceneError, match=r"^coloring.by: trap needs a formula"):
+        load_scene({**HEAD_DATA, "formula": {"inline": inline}, "coloring": {"by": "trap"}})
+    with pytest.raises(FormulaError, match="is for scenes of objects alone"):
+        clfractal.distances(inline, np.zeros((1, 3)))
+    with pytest.raises(ClfractalError, match=r"alone: must be true or false$"):
+        load_scene({**HEAD_DATA, "formula": {"inline": {**inline, "alone": "yes"}}})
 
 
 def test_kinds_of_colours_that_need_a_set() -> None:

@@ -246,6 +246,7 @@ FORMULA_KEYS = [
     "shape",
     "add",
     "derivative",
+    "alone",
     "chain",
 ]
 

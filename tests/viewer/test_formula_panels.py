@@ -34,7 +34,8 @@ def test_without_a_formula_panels_say_so_and_one_can_be_given() -> None:
     assert ui.studio.scene is before
     assert ui.studio.problems == {}
     assert formula.summary(ui) == "None"
-    assert typed(ui, formula_editor.text_of(before.formula)).error is not None
+    # The text that is there is that of a formula which says that it has no set.
+    assert typed(ui, formula_editor.text_of(before.formula)).error is None
     assert ui.studio.scene is before
     text = formula_editor.text_of(load_scene("scenes/mandelbulb.yaml").formula)
     assert typed(ui, text).error is None

@@ -72,8 +72,6 @@ def read_formula(text: str) -> dict[str, Any]:
 
 def text_of(spec: FormulaSpec) -> str:
     """The text of a scene's formula: a library's file with its comments, or what the scene holds."""
-    if spec.is_none:
-        return "# There is no formula yet: the scene shows objects alone.\n"
     if spec.name is not None:
         return read_text_file(folder("formulas/library") / f"{spec.name}.yaml")
     if spec.inline is not None:
