@@ -221,9 +221,7 @@ def _check_views(scene: Scene) -> None:
         try:
             check_parts(view, whole=False)
         except SceneError as error:
-            raise SceneError(
-                error.message, Where(path=f"layout.views.{number}.{error.where.path}")
-            ) from error
+            raise scene.layout.views[number].own_error(error, number) from error
 
 
 def _check_planes(scene: Scene) -> None:

@@ -1,10 +1,11 @@
 """Several views in one picture, as in the thesis's split window."""
 
-from dataclasses import dataclass
-from typing import Annotated
+from dataclasses import dataclass, replace
+from typing import Annotated, TypeVar
 
 from pydantic import Field
 
+from clfractal.errors import ClfractalError
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.glow import Glow
@@ -14,6 +15,8 @@ from clfractal.scene.renderer import Renderer
 from clfractal.schema.base import Color, Fraction, Section, problem, rule
 
 MAX_VIEWS = 16
+
+Mistake = TypeVar("Mistake", bound=ClfractalError)
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,6 +57,18 @@ class LayoutView(Section):
             left, top, width, height = self.area
             if width <= 0 or height <= 0 or left + width > 1 + 1e-9 or top + height > 1 + 1e-9:
                 raise problem("must lie within the picture, [0, 0, 1, 1], and not be empty", "area")
+
+    def own_error(self, error: Mistake, number: int) -> Mistake:
+        """What is wrong with the view's scene, told of the whole scene, in which it is the view of that number.
+
+        A key that the view does not replace is the scene's: it is wrong there, for this view.
+        """
+        name, path = f"layout.views.{number}", error.where.path or ""
+        if path.partition(".")[0] in self.changes():
+            where, message = replace(error.where, path=f"{name}.{path}"), error.message
+        else:
+            where, message = error.where, f"{error.message} (for {name})"
+        return type(error)(message, where, details=error.details)
 
     def changes(self) -> dict[str, object]:
         """The sections that the view replaces."""

@@ -6,7 +6,7 @@ document keeps the places of all values until the end, so that errors of every s
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -271,13 +271,14 @@ def _check_files(scene: Scene) -> None:
 
 def _check_views(scene: Scene) -> None:
     """What each view of its layout names."""
-    for number, (view, _) in enumerate(scene.views if scene.layout is not None else ()):
+    if scene.layout is None:
+        return
+    for number, (view, _) in enumerate(scene.views):
         try:
             for check in _NAMES:
                 view.derived(check)
         except (SceneError, FileError) as error:
-            where = replace(error.where, path=f"layout.views.{number}.{error.where.path}")
-            raise type(error)(error.message, where, details=error.details) from error
+            raise scene.layout.views[number].own_error(error, number) from error
 
 
 def _check_palettes(scene: Scene) -> None:

@@ -38,6 +38,8 @@ cut_planes: [{opacity: 0, cut: true, objects: [b]}, {opacity: §0.5}]
 => cut_planes.1.opacity: shows counts of a formula, and the scene's is none; 0 only cuts objects
 objects: {b: {join: §cut}}
 => objects.b.join: cut needs a formula, and the scene's is none; remove it, and the object stands for itself
+layout: {views: [{}, {coloring: {by: §trap}}]}
+=> layout.views.1.coloring.by: trap needs a formula, and the scene's is none; use solid, normal or residual
 objects: {b: {«OTHER»}}
 => objects.b.type: formula joins its set to that of a formula, and the scene's is none; make it the scene's own
 """,
@@ -58,6 +60,8 @@ def test_messages(text: str, expected: str) -> None:
         ("{name: none, parameters: {§power: 2}}", ".parameters.power: unknown parameter 'power'; known: none"),
         ("§none\nrenderer: {type: volume}", ": none is for surface renderers, got a volume; name a formula"),
         ("§none\nrenderer: {type: cut_plane}", ": none is for surface renderers, got a cut_plane; name a formula"),
+        ("§none\nlayout: {views: [{}, {renderer: {type: volume}}]}",
+         ": none is for surface renderers, got a volume; name a formula (for layout.views.1)"),
         ("§nothing", ": must be a mapping, got 'nothing'"),
     ],
 )  # fmt: skip
