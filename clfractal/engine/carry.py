@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 import numpy.typing as npt
@@ -18,12 +18,14 @@ from clfractal.device.select import Device
 from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Field, Struct
 from clfractal.device.watched import Watched
+from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.engine.canvas import PIXEL_GROUP, Canvas, whole_groups
 from clfractal.engine.job import Job
 from clfractal.integrators.plan import PlannedView
 from clfractal.integrators.records import bounces
 from clfractal.integrators.waves import has_lens
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import Light
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 
@@ -89,7 +91,20 @@ def _can_follow(old: PlannedView, view: PlannedView) -> bool:
 def _looked_at(scene: Scene, by: Scene) -> Scene:
     """A scene with the view of another, and what does not concern its pixels."""
     names = ("camera", "stereo", "output", "animation", "bookmarks")
-    return scene.model_copy(update={name: getattr(by, name) for name in names})
+    update: dict[str, object] = {name: getattr(by, name) for name in names}
+    if scene.lights != by.lights and len(scene.lights) == len(by.lights):
+        update["lights"] = tuple(
+            one.model_copy(update={"direction": other.direction})
+            if _goes_along(one, scene) and _goes_along(other, by)
+            else one
+            for one, other in zip(scene.lights, by.lights, strict=True)
+        )
+    return scene.model_copy(update=update)
+
+
+def _goes_along(light: Light, scene: Scene) -> TypeGuard[DirectionalLight]:
+    """Whether a light shines where the camera looks: what it lights changes as slowly as highlights move."""
+    return isinstance(light, DirectionalLight) and light.direction == scene.camera.ahead
 
 
 def program_text() -> FlatText:

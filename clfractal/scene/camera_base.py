@@ -161,6 +161,12 @@ class CameraBase(Section):
         return self.model_copy(update=changed)
 
     @property
+    def ahead(self) -> Vector:
+        """Where it looks, from the position to the target."""
+        x, y, z = (there - here for here, there in zip(self.position, self.target, strict=True))
+        return x, y, z
+
+    @property
     def angles(self) -> tuple[float, float, float]:
         """Azimuth and elevation, degrees, and distance: `orbit` with these values leads to this position."""
         return angles(self.position, self.target, self.up)

@@ -51,10 +51,9 @@ def draft(scene: Scene) -> Scene:
 
 def _headlight(scene: Scene) -> DirectionalLight:
     """A light that shines where the camera looks, as bright as the exposure wants."""
-    camera = scene.camera
-    ahead = tuple(there - here for here, there in zip(camera.position, camera.target, strict=True))
+    intensity = _HEADLIGHT * 2.0**-scene.output.stops
     return DirectionalLight.checked(
-        {"direction": ahead, "intensity": _HEADLIGHT * 2.0**-scene.output.stops, "shadow": False}
+        {"direction": scene.camera.ahead, "intensity": intensity, "shadow": False}
     )
 
 

@@ -87,9 +87,13 @@ class Painter:
         self._carrier: Carrier | None = None
         self._foreseen = False
 
-    def foreseen(self, job: Job) -> CarryProgram | None:
-        """The task that gets ready what carries pixels over, once, for the first picture that can move so."""
-        if self._foreseen or not can_carry(job, job):
+    def foreseen(self, moving: Callable[[], Job]) -> CarryProgram | None:
+        """The task that gets ready what carries pixels over, once, for the first picture that can move so.
+
+        Args:
+            moving: gives the job of the picture while it moves.
+        """
+        if self._foreseen or not can_carry(job := moving(), job):
             return None
         self._foreseen = True
         return CarryProgram(self)

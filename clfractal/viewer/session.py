@@ -460,7 +460,7 @@ class Session:
         work.seconds += seconds
         work.samples, work.prepared = samples[1], True
         if samples[0] == 0:
-            carry = self._painter.foreseen(work.job)
+            carry = self._painter.foreseen(partial(self._moving, work))
             draft = self._drafts.foreseen(work.wanted.scene, self._prepared)
             for foreseen in (carry, draft):
                 if foreseen is not None:
@@ -471,6 +471,12 @@ class Session:
         if not work.ranges or samples[0] == 0 or work.schedule.due(time.perf_counter()):
             last = not work.ranges and not work.cleans
             self._publish(work.wanted, work.job, canvas, work.growth(seconds, finished=last))
+
+    def _moving(self, work: Gathering) -> Job:
+        """What is rendered while the camera of a picture moves."""
+        scene = work.wanted.scene
+        shaded = self._drafts.shaded(scene, True)
+        return work.job if shaded is scene else self._prepared(sharp(shaded))
 
     def _grown(self, work: Gathering, canvas: Canvas, state: Progress) -> None:
         """Shows a picture whose pass is under way."""

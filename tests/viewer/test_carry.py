@@ -18,6 +18,7 @@ from clfractal.errors import DeviceError
 from clfractal.files import srgb
 from clfractal.scene.model import Scene
 from clfractal.viewer import session as sessions_module
+from clfractal.viewer.editing import edited
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.pacing import Pacing
 from tests.scenes import STEREO
@@ -37,6 +38,9 @@ from tests.viewer.sessions import (
 
 DEGREE = np.pi / 180
 LARGER = ("image.width=240", "image.height=160")
+PATHS = ("lighting={mode: path, bounces: 2}", "renderer.samples=2")
+LAMP = ("lights=[{type: sphere, position: [1, -3, 2], radius: 0.3, intensity: 15}]",)
+SKY = ("environment={name: studio}", "lights=[]")
 ORTHOGRAPHIC = "camera={projection: orthographic, position: [0, -2.8, 0.6], target: [0, 0, 0], height: 2.6}"
 
 
@@ -104,6 +108,49 @@ def test_a_movement_that_ends_by_itself_has_the_bits_of_the_shell(
         frame = watch.rest()
         assert (frame.finished, frame.carried) == (True, False)
         equal_pictures(framebuffers_of(frame).picture(), shell(last))
+
+
+@pytest.mark.parametrize("more", [LAMP, SKY], ids=["lamp", "sky"])
+@pytest.mark.parametrize("divider", [1, 2])
+def test_drafts_are_carried_and_a_picture_along_paths_at_rest_knows_nothing_of_them(
+    more: tuple[str, ...], divider: int, device: Device, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The first is rendered, as the picture at rest has other light; a light at the eye moves with it."""
+    monkeypatch.setattr(Pacing, "divider", lambda *_, **__: divider)
+    scene = scene_of(BULB, *LARGER, *PATHS, *more)
+    with session_on(device) as watch:
+        watch.finished(scene)
+        frames = [moved(watch, turned(scene, DEGREE * step)) for step in range(1, 8)]
+        assert all(frame.is_draft and not frame.finished for frame in frames)
+        assert [frame.carried for frame in frames] == [False] + 6 * [True]
+        found, wanted = planes(frames[-1])[0], by_rays(device, watch, frames[-1])[0]
+        off = np.abs(linear_to_screen(found) - linear_to_screen(wanted))
+        assert off.mean() < 0.02
+        last = turned(scene, DEGREE * 7)
+        frame = watch.finished(last)
+        after = planes(frame)
+        assert (frame.carried, frame.is_draft) == (False, False)
+    with session_on(device) as watch:
+        fresh = planes(watch.finished(last))
+    for one, other in zip(after, fresh, strict=True):
+        for name in CHANNELS:
+            np.testing.assert_array_equal(one[name].view(np.uint32), other[name].view(np.uint32), name)
+
+
+def test_a_light_that_shines_where_the_camera_looks_goes_with_it(device: Device) -> None:
+    """Not one that does so in one of two pictures alone, or that is another light."""
+
+    def lit(step: float, direction: tuple[float, ...] | None = None, **more: object) -> Job:
+        scene = turned(scene_of(BULB), step)
+        light = {"direction": direction or scene.camera.ahead, **more}
+        return prepare(edited(scene, {"lights": [light]}), device, channels=CHANNELS)
+
+    assert can_carry(lit(0), lit(0.1))
+    assert can_carry(lit(0, (1, 1, -1)), lit(0.1, (1, 1, -1)))
+    assert not can_carry(lit(0), lit(0.1, (1, 1, -1)))
+    assert not can_carry(lit(0, (1, 1, -1)), lit(0.1))
+    assert not can_carry(lit(0), lit(0.1, intensity=2.0))
+    assert not can_carry(lit(0, (1, 1, -1)), lit(0.1, (1, 1, -2)))
 
 
 @pytest.mark.parametrize(
