@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import random
 import signal
 from collections.abc import Iterator
@@ -54,6 +55,21 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     kept = set(random.Random(config.getoption("--seed")).sample(range(len(items)), count))
     config.hook.pytest_deselected(items=[item for index, item in enumerate(items) if index not in kept])
     items[:] = [item for index, item in enumerate(items) if index in kept]
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_fixture_setup() -> None:
+    _keep_the_environment()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call() -> None:
+    _keep_the_environment()
+
+
+def _keep_the_environment() -> None:
+    """No variable that is another one in each test: a child process that compiles serves one environment only."""
+    os.environ.pop("PYTEST_CURRENT_TEST", None)
 
 
 @pytest.fixture(scope="session")
