@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import signal
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -30,11 +31,34 @@ camera: {position: [0, -2.2, 0], fov: 40}
 renderer: {type: surface, samples: 65536, detail: 0.01, max_steps: 100000}
 """
 
+# The program, which goes no further when it has stored so many tiles, until it is ended or a file `go` is there: so it is
+# not done before it is stopped, however fast the machine is, and however late who stops it.
+HOLD = """
+import os, sys, time
+from clfractal.images.store import JournalFramebuffer
+put, most, stored = JournalFramebuffer.put, int(sys.argv.pop(1)), []
+
+def held(*arguments, **named):
+    put(*arguments, **named)
+    stored.append(arguments)
+    while len(stored) >= most and not os.path.exists("go"):
+        time.sleep(0.005)
+
+JournalFramebuffer.put = held
+sys.argv[0] = "clfractal"
+"""
+MAIN = "from clfractal.cli import main\nmain()\n"
+
 # What an answer may take on a machine that is loaded: ten times the promise. The promise itself is kept by its parts: see
 # `test_interrupt.test_the_promise`.
 LIMIT_SECONDS = 5.0
 
 PROMISE_SECONDS = 0.5
+
+
+def holding(tiles: int, *arguments: str, code: str = MAIN) -> list[str]:
+    """The command line of the program that holds after so many tiles; `code` calls it."""
+    return [sys.executable, "-P", "-c", HOLD + code, str(tiles), *arguments]
 
 
 def interrupt(

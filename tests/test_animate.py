@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 import os
 import signal
-import subprocess
-import time
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +18,8 @@ from clfractal.files.exr import read_exr
 from clfractal.files.frame_names import frame_file
 from tests.halves import halves_of
 from tests.interrupts import interrupted_at
-from tests.shell import InProcess, command, environment, works
+from tests.long_renders import holding
+from tests.shell import InProcess, Running, has_tiles, works
 
 SCENE = """version: 1
 formula: {name: mandelbulb, iterations: 6}
@@ -136,13 +135,11 @@ def test_a_frame_in_work_keeps_its_tiles(clf: InProcess, monkeypatch: pytest.Mon
 def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
     """Frames of 36 tiles, which are kept while a frame is in work; the film is the same as without kills."""
     size = ["--size", "384x384", "--set", "formula.iterations=12", "--samples", "2", "--frames", "0-1"]
-    for seconds in (1.5, 2.5):
-        running = subprocess.Popen(
-            command("animate", "scene.yaml", "-o", "k#.exr", "--resume", "--quiet", *size), env=environment()
-        )
-        time.sleep(seconds)
-        running.send_signal(signal.SIGKILL)
-        running.wait()
+    for number in range(2):
+        words = holding(9, "animate", "scene.yaml", "-o", "k#.exr", "--resume", "--quiet", *size)
+        running = Running(Path(), words=words)
+        running.wait_until(has_tiles(Path("k0.exr.partial"), 9 * (number + 1)))
+        assert running.ended_by(signal.SIGKILL)[0] == -signal.SIGKILL
         for file in Path().glob("k?.exr"):
             read_exr(file)
     works(clf("animate", "scene.yaml", "-o", "k#.exr", "--resume", *size))

@@ -319,8 +319,8 @@ def test_what_is_told_meanwhile(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.usefixtures("interrupts_are_not_ignored")
 @pytest.mark.parametrize("name", ["big.nrrd", "big.ply"])
 def test_an_interrupt_leaves_nothing(name: str, tmp_path: Path) -> None:
-    """In the middle of the work, at once."""
-    (tmp_path / "scene.yaml").write_text(SCENE)
+    """In the middle of the work, which takes minutes on any machine; at once."""
+    (tmp_path / "scene.yaml").write_text(SCENE.replace("iterations: 12", "iterations: 5000"))
     kind, side = ("voxelize", "600") if name.endswith("nrrd") else ("mesh", "700")
     running = Running(tmp_path, kind, "scene.yaml", "-o", name, "--resolution", side)
     assert running.process.stderr is not None

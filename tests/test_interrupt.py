@@ -25,7 +25,14 @@ from clfractal.device.select import choose, sees_host_writes
 from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes
-from tests.long_renders import ENDLESS, LIMIT_SECONDS, PROMISE_SECONDS, interrupt, interrupted_in_a_kernel
+from tests.long_renders import (
+    ENDLESS,
+    LIMIT_SECONDS,
+    PROMISE_SECONDS,
+    holding,
+    interrupt,
+    interrupted_in_a_kernel,
+)
 from tests.shell import SCENE, Running, has_tiles, process, python, wait_until, works
 
 pytestmark = [
@@ -257,7 +264,7 @@ def begun(folder: Path, *arguments: str, **settings: Any) -> Running:
 
 @pytest.mark.parametrize("sent", [signal.SIGTERM, signal.SIGHUP])
 def test_a_render_is_continued(tmp_path: Path, sent: signal.Signals) -> None:
-    work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work = begun(tmp_path, words=holding(1, "render", "scene.yaml", "-o", "a.exr", "--quiet"))
     work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
     status, told = work.ended_by(sent)
     assert status == 128 + sent
@@ -308,12 +315,13 @@ def test_what_was_ignored_stays_so(tmp_path: Path) -> None:
         for each in (signal.SIGHUP, signal.SIGINT):
             signal.signal(each, signal.SIG_IGN)
 
-    work = begun(tmp_path, "render", "scene.yaml", "-o", "a.exr", "--quiet", before=ignore)
-    work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
-    before = (tmp_path / "a.exr.partial").stat().st_size
+    words = holding(2, "render", "scene.yaml", "-o", "a.exr", "--quiet")
+    work = begun(tmp_path, words=words, before=ignore)
+    work.wait_until(has_tiles(tmp_path / "a.exr.partial", 2))
     work.process.send_signal(signal.SIGHUP)
     work.process.send_signal(signal.SIGINT)
-    work.wait_until(lambda: (tmp_path / "a.exr.partial").stat().st_size > before)
+    (tmp_path / "go").touch()
+    work.wait_until(has_tiles(tmp_path / "a.exr.partial", 3))
     status, told = work.ended_by(signal.SIGTERM)
     assert status == 143
     assert "--resume continues" in told
@@ -356,7 +364,7 @@ main()
 @pytest.mark.parametrize("code", [SEVERAL, TURNED], ids=["several", "turned"])
 def test_the_first_signal_counts(tmp_path: Path, code: str) -> None:
     """Whatever comes afterwards: other signals, or an error that is a consequence."""
-    words = [sys.executable, "-P", "-c", code, "render", "scene.yaml", "-o", "a.exr", "--quiet"]
+    words = holding(1, "render", "scene.yaml", "-o", "a.exr", "--quiet", code=code)
     work = begun(tmp_path, words=words)
     work.wait_until(has_tiles(tmp_path / "a.exr.partial"))
     status, told = work.ended_by(signal.SIGTERM)

@@ -7,7 +7,6 @@ import random
 import re
 import signal
 import subprocess
-import sys
 import time
 import zlib
 from contextlib import suppress
@@ -21,12 +20,14 @@ import clfractal
 from clfractal.cli.shell import Shell
 from clfractal.cli.unfinished import Unfinished, continued
 from clfractal.device.select import choose
+from clfractal.engine import finish
 from clfractal.engine.prepare import prepare
 from clfractal.files.exr import read_exr
 from clfractal.files.journal import _HEAD, MAGIC
+from tests.calls import raising
 from tests.interrupts import planes
-from tests.long_renders import HEAVY, TILES
-from tests.shell import SCENE, Ended, Running, command, environment, has_tiles, process, python, works
+from tests.long_renders import HEAVY, TILES, holding
+from tests.shell import Ended, InProcess, Running, command, environment, has_tiles, process, works
 from tests.variants import one_of
 
 pytestmark = pytest.mark.usefixtures("interrupts_are_not_ignored")
@@ -79,7 +80,7 @@ def test_killed_at_random_moments(seed: int, undisturbed: tuple[Path, float], tm
 def test_resuming_renders_only_what_is_missing(undisturbed: tuple[Path, float], tmp_path: Path) -> None:
     """Killed as soon as there is a tile on the disk; the statistics tell what the second run did."""
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    running = Running(tmp_path, "render", "heavy.yaml", "-o", "out.exr", "--quiet")
+    running = Running(tmp_path, words=holding(2, "render", "heavy.yaml", "-o", "out.exr", "--quiet"))
     running.wait_until(has_tiles(tmp_path / "out.exr.partial", 2))
     assert running.ended_by(signal.SIGKILL)[0] == -signal.SIGKILL
     assert render(tmp_path, "--resume", "--stats", "stats.json", "--quiet") == Ended(0, "", "")
@@ -90,22 +91,17 @@ def test_resuming_renders_only_what_is_missing(undisturbed: tuple[Path, float], 
     assert planes(tmp_path / "out.exr") == planes(undisturbed[0])
 
 
-def interrupted(folder: Path) -> None:
-    """Leaves the work of the small scene behind: the disk was full when the picture was written."""
-    (folder / "scene.yaml").write_text(SCENE)
-    code = (
-        "import sys; from clfractal.cli import main; from clfractal.engine import finish\n"
-        "def full(*_): raise OSError(28, 'No space left on device')\n"
-        "finish.save_outputs = lambda *a, **k: full()\n"
-        "sys.argv = ['clfractal', 'render', 'scene.yaml', '-o', 'a.png', '--quiet']; main()"
-    )
-    assert python(code, folder=folder).status == 2
-    assert (folder / "a.png.partial").exists()
+@pytest.fixture
+def left(clf: InProcess, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The work of the small scene, in the current folder: the disk was full when the picture was written."""
+    with monkeypatch.context() as patch:
+        patch.setattr(finish, "save_outputs", raising(OSError(28, "No space left on device")))
+        assert clf("render", "scene.yaml", "-o", "a.png", "--quiet").status == 2
+    return Path("a.png.partial")
 
 
-def test_other_work_is_not_resumed(tmp_path: Path) -> None:
-    interrupted(tmp_path)
-    before = (tmp_path / "a.png.partial").read_bytes()
+def test_other_work_is_not_resumed(clf: InProcess, left: Path) -> None:
+    before = left.read_bytes()
     for options, said in (
         (["--set", "camera.fov=44"], "the scene has changed"),
         (["--samples", "4"], "the scene has changed"),
@@ -113,15 +109,14 @@ def test_other_work_is_not_resumed(tmp_path: Path) -> None:
         (["--region", "0,0,8,8"], "the region was [0, 0, 40, 36] and is [0, 0, 8, 8]"),
         (["--set", "output.channels=[R, G, B]"], "the channels was"),
     ):
-        ended = process(["render", "scene.yaml", "-o", "a.png", "--resume", *options], tmp_path)
+        ended = clf("render", "scene.yaml", "-o", "a.png", "--resume", *options)
         assert ended.is_one_line(2, "a.png.partial: cannot be resumed: ", said)
-        assert (tmp_path / "a.png.partial").read_bytes() == before
-        assert not (tmp_path / "a.png").exists()
+        assert left.read_bytes() == before
+        assert not Path("a.png").exists()
 
 
-def test_another_version_or_device_is_not_resumed(tmp_path: Path) -> None:
-    interrupted(tmp_path)
-    whole = (tmp_path / "a.png.partial").read_bytes()
+def test_another_version_or_device_is_not_resumed(clf: InProcess, left: Path) -> None:
+    whole = left.read_bytes()
     for old, new, said in (
         (f'"version": "{clfractal.__version__}"', '"version": "0.0.0"', 'the version was "0.0.0"'),
         ('"device": "', '"device": "Old ', "the device"),
@@ -129,8 +124,8 @@ def test_another_version_or_device_is_not_resumed(tmp_path: Path) -> None:
         _, length, _ = _HEAD.unpack_from(whole)
         text = whole[_HEAD.size : _HEAD.size + length].decode().replace(old, new).encode()
         changed = _HEAD.pack(MAGIC, len(text), zlib.crc32(text)) + text + whole[_HEAD.size + length :]
-        (tmp_path / "a.png.partial").write_bytes(changed)
-        ended = process(["render", "scene.yaml", "-o", "a.png", "--resume"], tmp_path)
+        left.write_bytes(changed)
+        ended = clf("render", "scene.yaml", "-o", "a.png", "--resume")
         assert ended.is_one_line(2, "a.png.partial: cannot be resumed: ", said)
 
 
@@ -155,23 +150,24 @@ def test_work_goes_on_with_the_lanes_that_it_began_with(tmp_path: Path) -> None:
     assert continued(elsewhere, whole).views[0].plan.lanes == other
 
 
-def test_without_resume_it_starts_anew_and_says_so(tmp_path: Path) -> None:
-    interrupted(tmp_path)
-    ended = works(process(["render", "scene.yaml", "-o", "a.png"], tmp_path))
+def test_without_resume_it_starts_anew_and_says_so(clf: InProcess, left: Path) -> None:
+    assert left.exists()
+    ended = works(clf("render", "scene.yaml", "-o", "a.png"))
     assert ended.err.splitlines()[0].startswith("a.png.partial: earlier work is discarded")
-    assert {path.name for path in tmp_path.iterdir()} == {"scene.yaml", "a.png"}
+    assert {path.name for path in Path().iterdir()} == {"scene.yaml", "a.png"}
 
 
 def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
     (tmp_path / "heavy.yaml").write_text(HEAVY)
-    running = Running(tmp_path, "render", "heavy.yaml", "-o", "out.exr", "--quiet")
+    running = Running(tmp_path, words=holding(1, "render", "heavy.yaml", "-o", "out.exr", "--quiet"))
     try:
-        running.wait_until((tmp_path / "out.exr.partial").exists)
+        running.wait_until(has_tiles(tmp_path / "out.exr.partial"))
         running.process.send_signal(signal.SIGSTOP)
         # (Its work is not discarded, and nothing else is said.)
         ended = process(["render", "heavy.yaml", "-o", "out.exr"], tmp_path)
         assert ended.is_one_line(2, "out.exr.partial: is in use")
     finally:
+        (tmp_path / "go").touch()
         assert running.ended_by(signal.SIGCONT)[0] == 0
 
 
@@ -182,22 +178,6 @@ def test_a_picture_that_is_being_rendered_is_left_alone(tmp_path: Path) -> None:
 PAIR = HEAVY.replace("width: 224, height: 160", "width: 128, height: 96") + "stereo: {separation: 0.3}\n"
 PAIR_TILES = 2 * 4 * 3
 LEFT, RIGHT = "out.exr.partial", "out.exr.right.partial"
-
-
-# The program, with a pause after each tile that it has stored: so there is time to stop it between two, however many
-# tiles the device renders at once.
-SLOWLY = """
-import sys, time
-from clfractal.cli import main
-from clfractal.images.store import JournalFramebuffer
-put = JournalFramebuffer.put
-def slowly(*arguments):
-    put(*arguments)
-    time.sleep(0.03)
-JournalFramebuffer.put = slowly
-sys.argv = ["clfractal", "render", "heavy.yaml", "-o", "out.exr", "--quiet"]
-main()
-"""
 
 
 @pytest.fixture(scope="module")
@@ -213,7 +193,8 @@ def undisturbed_pair(tmp_path_factory: pytest.TempPathFactory) -> dict[str, byte
 def stopped(folder: Path, number: signal.Signals, side: str) -> tuple[int, str]:
     """A render that gets a signal as soon as some of an eye's tiles are on the disk: status, and standard error."""
     (folder / "heavy.yaml").write_text(PAIR)
-    running = Running(folder, words=[sys.executable, "-P", "-c", SLOWLY])
+    tiles = 1 if side == LEFT else PAIR_TILES // 2 + 1
+    running = Running(folder, words=holding(tiles, "render", "heavy.yaml", "-o", "out.exr", "--quiet"))
     running.wait_until(has_tiles(folder / side))
     return running.ended_by(number)
 

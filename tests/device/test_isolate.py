@@ -51,6 +51,11 @@ def slow_echo_job(request: dict[str, Any]) -> list[Any]:
     return echo_job(request)
 
 
+def impatient_job(request: dict[str, Any]) -> None:
+    """From now on the child waits for no other job."""
+    sys.modules["__main__"].IDLE_S = 0.0  # type: ignore[attr-defined]
+
+
 def raise_job(request: dict[str, Any]) -> None:
     raise FormulaError("wrong formula", details="why")
 
@@ -138,22 +143,11 @@ def test_a_child_ends_by_itself_after_many_jobs(device: Device) -> None:
     assert len(set(processes)) == 2
 
 
-def test_a_child_without_work_ends_by_itself(
-    device: Device, pool: Children, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_child_without_work_ends_by_itself(device: Device, pool: Children) -> None:
     """It holds much memory; nobody tells it to go."""
     assert 5 <= child.IDLE_S <= 30
-    begin = subprocess.Popen
-
-    def impatient(command: list[str], **settings: Any) -> subprocess.Popen[bytes]:
-        module = command.index("-m")
-        assert command[module + 1] == child.__name__
-        text = f"import {child.__name__} as child\nchild.IDLE_S = 4.0\nchild.main()"
-        return begin([*command[:module], "-c", text, *command[module + 2 :]], **settings)
-
-    monkeypatch.setattr(subprocess, "Popen", impatient)
     process = _run(device, "echo_job", number=1)[1]
-    assert _run(device, "echo_job", number=2) == [3, process]
+    _run(device, "impatient_job")
     wait_until(lambda: not _is_running(process))
     assert _run(device, "echo_job", number=3)[0] == 4
 

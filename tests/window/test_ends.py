@@ -17,7 +17,7 @@ pytestmark = pytest.mark.quiet
 
 PLAIN = ("--size", "480x320", "--no-panels")
 # What one answer may take on a loaded machine; the promise, half a second, the fastest of three has to keep.
-LIMIT_SECONDS, PROMISE_SECONDS = 1.5, 0.5
+LIMIT_SECONDS, PROMISE_SECONDS = 5.0, 0.5
 # Gathers samples for minutes.
 LONG = SURFACE.replace("samples: 3", "samples: 4096").replace("iterations: 7", "iterations: 40")
 
