@@ -38,6 +38,34 @@ animation:
 """
 FRAMES = 12
 
+# A worker that takes no second bundle before a file `go` is there.
+HELD = """
+import time
+from pathlib import Path
+from clfractal.engine.local_executor import LocalExecutor
+begun = []
+
+def held(*arguments, execute=LocalExecutor.execute):
+    begun.append(arguments)
+    while len(begun) > 1 and not Path("go").exists():
+        time.sleep(0.005)
+    yield from execute(*arguments)
+
+LocalExecutor.execute = held
+"""
+# One that makes this file when it has rendered a tile.
+LETS_GO = """
+from pathlib import Path
+from clfractal.engine.local_executor import LocalExecutor
+
+def tells(*arguments, execute=LocalExecutor.execute):
+    for result in execute(*arguments):
+        Path("go").touch()
+        yield result
+
+LocalExecutor.execute = tells
+"""
+
 
 def free_port() -> int:
     """A port that nobody uses now."""

@@ -9,17 +9,24 @@ import argparse
 import random
 import tempfile
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 from tests.cluster.farm import FILM, FRAMES, HEAVY, Client, Farm
 from tests.interrupts import planes
-from tests.shell import process
+from tests.shell import has_tiles, process, wait_until
 
 
-def kill_at_random(farm: Farm, client: Client, chance: random.Random, most: int) -> int:
-    """Kills workers while a client runs, and starts another one for each; gives how many were killed."""
-    kills = 0
-    pause = 1.5
+def kill_at_random(
+    farm: Farm, client: Client, chance: random.Random, most: int, begun: Callable[[], bool]
+) -> int:
+    """Kills workers while a client runs, and starts another one for each; gives how many were killed.
+
+    Args:
+        begun: whether some of the work is done, and not all of it: that is when the first is killed.
+    """
+    wait_until(begun, client.process)
+    kills, pause = 0, 0.0
     while kills < most:
         until = time.monotonic() + chance.uniform(0.3, 1.0) * pause
         while time.monotonic() < until:
@@ -28,7 +35,7 @@ def kill_at_random(farm: Farm, client: Client, chance: random.Random, most: int)
             time.sleep(0.02)
         farm.kill(chance.choice(sorted(farm.workers)))
         farm.add()
-        kills += 1
+        kills, pause = kills + 1, 1.5
     return kills
 
 
@@ -39,7 +46,7 @@ def main() -> None:
     wanted = parser.parse_args()
     chance = random.Random(wanted.seed)
     kills = rounds = 0
-    begun = time.monotonic()
+    start = time.monotonic()
     with tempfile.TemporaryDirectory() as name, Farm(Path(name)) as farm:
         folder = Path(name)
         (folder / "heavy.yaml").write_text(HEAVY)
@@ -57,7 +64,8 @@ def main() -> None:
                 else ["render", "heavy.yaml", "-o", "p.exr"]
             )
             with Client(folder, *order, "--cluster", farm.address) as client:
-                kills += kill_at_random(farm, client, chance, wanted.kills - kills)
+                begun = (folder / "f_00.exr").exists if is_film else has_tiles(folder / "p.exr.partial")
+                kills += kill_at_random(farm, client, chance, wanted.kills - kills, begun)
                 status, told = client.ended(600)
             assert status == 0, told
             if is_film:
@@ -67,7 +75,7 @@ def main() -> None:
             for path in (*folder.glob("f_*.exr"), *folder.glob("p.exr")):
                 path.unlink()
             print(
-                f"{kills} kills, {rounds} renders, {time.monotonic() - begun:.0f} s: 0 pixels differ",
+                f"{kills} kills, {rounds} renders, {time.monotonic() - start:.0f} s: 0 pixels differ",
                 flush=True,
             )
 

@@ -14,10 +14,11 @@ import pytest
 import clfractal
 from clfractal.cluster import dispatch, link
 from clfractal.files.exr import read_exr
-from tests.cluster.farm import FRAMES, HEAVY, Client, Farm, free_port, journal_grows
+from tests.cluster.farm import FRAMES, HEAVY, HELD, LETS_GO, Client, Farm, free_port, journal_grows
 from tests.cluster.kills import kill_at_random
 from tests.interrupts import planes
-from tests.shell import Running, process, wait_until, works
+from tests.long_renders import LIMIT_SECONDS, holding
+from tests.shell import Running, has_tiles, process, wait_until, works
 
 resource = pytest.importorskip("resource", reason="signals and limits of processes are those of POSIX")
 
@@ -32,7 +33,8 @@ def impatient(folder: Path, seconds: float, *order: str) -> Running:
 def test_workers_killed_during_a_picture(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
     order = ["render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address]
     with Client(folder, *order) as client:
-        kills = kill_at_random(farm, client, random.Random(1), most=4)
+        begun = has_tiles(folder / "out.exr.partial")
+        kills = kill_at_random(farm, client, random.Random(1), most=4, begun=begun)
         status, told = client.ended()
     assert (status, kills > 0) == (0, True), told
     assert planes(folder / "out.exr") == picture
@@ -41,7 +43,8 @@ def test_workers_killed_during_a_picture(folder: Path, farm: Farm, picture: dict
 def test_workers_killed_during_a_film(folder: Path, farm: Farm, film: list[dict[str, bytes]]) -> None:
     order = ["animate", "film.yaml", "-o", "frame_##.exr", "--cluster", farm.address]
     with Client(folder, *order) as client:
-        kills = kill_at_random(farm, client, random.Random(2), most=3)
+        begun = (folder / "frame_00.exr").exists
+        kills = kill_at_random(farm, client, random.Random(2), most=3, begun=begun)
         status, told = client.ended()
     assert (status, kills > 0) == (0, True), told
     assert [planes(folder / f"frame_{number:02d}.exr") for number in range(FRAMES)] == film
@@ -51,12 +54,16 @@ def test_the_scheduler_returns(folder: Path, farm: Farm, picture: dict[str, byte
     with Client(folder, "render", "heavy.yaml", "-o", "out.exr", "--cluster", farm.address) as client:
         journal_grows(folder)
         farm.kill_scheduler()
-        time.sleep(1)
-        farm.start_scheduler()
-        farm.add()
-        status, told = client.ended()
+        assert client.process.stderr is not None
+        told = []
+        for line in client.process.stderr:
+            told.append(line.rstrip("\n"))
+            if "the scheduler is gone" in line:
+                farm.start_scheduler()
+                farm.add()
+        status, _ = client.ended()
     assert status == 0, told
-    lines = [line for line in told.splitlines() if line.startswith(farm.address)]
+    lines = [line for line in told if line.startswith(farm.address)]
     assert lines == [
         f"{farm.address}: the scheduler is gone; waiting 60 s for it",
         f"{farm.address}: the scheduler is back",
@@ -79,7 +86,7 @@ def test_the_scheduler_does_not_return(folder: Path, farm: Farm, picture: dict[s
 
 
 def test_a_worker_that_stops_answering(farm: Farm, monkeypatch: pytest.MonkeyPatch, alone: Path) -> None:
-    monkeypatch.setattr(link, "SILENT_SECONDS", 3.0)
+    monkeypatch.setattr(link, "SILENT_SECONDS", 8.0)  # of a busy machine, whose other worker is not that late
     told: list[str] = []
     stopped = farm.workers["w0"]
     with clfractal.Cluster(farm.address, tell=told.append) as cluster:
@@ -100,7 +107,7 @@ def test_a_worker_that_stops_while_it_is_read(
 ) -> None:
     """Its connection stays open, and nothing comes any more: what it had is done again by the other one."""
     worker = pytest.importorskip("distributed.worker")
-    monkeypatch.setattr(link, "SILENT_SECONDS", 3.0)
+    monkeypatch.setattr(link, "SILENT_SECONDS", 8.0)
     told, left = list[str](), ["w0"]
 
     async def read(rpc: object, keys: object, address: str, *more: object, **settings: object) -> object:
@@ -123,10 +130,10 @@ def test_late_workers_join_and_early_ones_go(folder: Path, picture: dict[str, by
     with Farm(folder, workers=0) as farm:
         order = ["render", "heavy.yaml", "-o", "out.exr", "--stats", "s.json", "--cluster", farm.address]
         with Client(folder, *order) as client:
-            first = farm.add()
+            first = farm.add(preload=HELD)
             journal_grows(folder)
-            farm.add()
-            time.sleep(2)
+            farm.add(preload=LETS_GO)
+            wait_until((folder / "go").exists)
             farm.kill(first)
             status, told = client.ended()
         assert status == 0, told
@@ -137,7 +144,7 @@ def test_late_workers_join_and_early_ones_go(folder: Path, picture: dict[str, by
 
 def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> None:
     """A tile of minutes: its worker ends it as soon as nobody wants it."""
-    order = ["render", "heavy.yaml", "--set", "renderer.samples=20000", "-o", "out.exr"]
+    order = ["render", "heavy.yaml", "--set", "renderer.samples=200000", "-o", "out.exr"]
     with Client(folder, *order, "--cluster", farm.address) as client:
         wait_until(lambda: _at_work(farm), seconds=60)
         time.sleep(2)
@@ -146,13 +153,13 @@ def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> Non
         client.process.send_signal(signal.SIGINT)
         lines = iter(client.process.stderr or [])
         assert any(line.endswith("out.exr: interrupted before a tile was done\n") for line in lines)
-        assert time.monotonic() - start < 0.5  # the answer; a busy system may take longer to end the process
-        assert client.ended(10)[0] == 130
+        assert time.monotonic() - start < LIMIT_SECONDS  # the answer; to end the process may take longer
+        assert client.ended()[0] == 130
     # The same workers are free at once.
     with clfractal.Cluster(farm.address) as cluster:
         start = time.monotonic()
         clfractal.render(HEAVY, executor=cluster, samples=1)
-        assert time.monotonic() - start < 20
+        assert time.monotonic() - start < 60  # the tile would take longer
     assert set(farm.workers) == {"w0", "w1"}
 
 
@@ -165,9 +172,8 @@ def _at_work(farm: Farm) -> bool:
 
 def test_a_killed_client_is_resumed(folder: Path, farm: Farm, picture: dict[str, bytes]) -> None:
     order = ["render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", farm.address]
-    with Client(folder, *order) as client:
+    with Client(folder, words=holding(1, *order)):
         journal_grows(folder)
-        assert client.running
     works(process([*order, "--resume", "--stats", "s.json"], folder))
     assert '"tiles_resumed": 0' not in (folder / "s.json").read_text()
     assert planes(folder / "out.exr") == picture
@@ -269,7 +275,7 @@ def test_nobody_answers(folder: Path) -> None:
     address = f"127.0.0.1:{free_port()}"
     ended = process(["render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", address], folder)
     assert ended.is_one_line(3, f"tcp://{address}: the scheduler does not answer within 10 s")
-    assert time.monotonic() - start < 10 + 5
+    assert time.monotonic() - start < 10 + 50  # it waits once
     assert not list(folder.glob("out.exr*"))
 
 
