@@ -18,6 +18,7 @@ from tests.devices import device
 from tests.render.known_lights import BRIGHT, PLACE, ground
 from tests.render.shots import ORTHOGRAPHIC, SOLIDS, Floats, colors, points_of, shoot
 from tests.scenes import scene_of
+from tests.variants import combinations
 
 VERTICAL = [0, 10, 25, 32.5, 40, 60, 90]
 # The horizontal angles of each symmetry, and how it brings others to them.
@@ -108,10 +109,16 @@ def lit(folder: Path, text: str, mode: str = "direct", **light: Any) -> Scene:
     )
 
 
-@pytest.mark.parametrize("mode", ["direct", "path"])
+# (In float64 with as many lanes as other tests of objects take: programs are the same.)
 @pytest.mark.parametrize("symmetry", SYMMETRIES)
 @pytest.mark.parametrize(
-    ("precision", "lanes"), [("float32", None), ("float64", 1)], ids=["float32", "float64"]
+    ("mode", "precision", "lanes"),
+    [
+        ("direct", "float32", None),
+        ("path", "float32", None),
+        ("direct", "float64", 4),
+        *combinations([("path", "float64", 4), ("direct", "float64", 1), ("path", "float64", 1)]),
+    ],
 )
 def test_irradiance_is_that_of_the_table(
     symmetry: str, mode: str, precision: Precision, lanes: int | None, tmp_path: Path

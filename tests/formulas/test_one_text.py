@@ -6,6 +6,7 @@ import math
 import pickle
 import re
 import time
+from itertools import pairwise, product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from clfractal.formulas.together import write_together
 from clfractal.geometry.solids import Body
 from clfractal.integrators.points import distances, nearest
 from clfractal.scene.load import load_scene
+from tests.variants import combinations
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 WITH_PARAMETERS = [name for name in SINGLE if catalog.load(name).parameters]
@@ -345,8 +347,14 @@ def test_equal_functions_are_there_once_with_constants_for_each() -> None:
     assert together.formulas[0].constants != together.formulas[2].constants
 
 
-@pytest.mark.parametrize("other", KINDS)
-@pytest.mark.parametrize("own", ["hast", "quaternion_julia"])
+# Each beside the next one, so each once as the set and once as the other.
+PAIRS = list(pairwise([*KINDS, next(iter(KINDS))]))
+
+
+@pytest.mark.parametrize(
+    ("own", "other"),
+    [*PAIRS, *combinations(sorted({*product(("hast", "quaternion_julia"), KINDS)} - {*PAIRS}))],
+)
 def test_each_formula_is_that_by_itself(own: str, other: str) -> None:
     """Two sets far apart: near each one the distances, normals and counts are its own."""
     place = [APART, 0.0, 0.0]

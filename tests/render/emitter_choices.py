@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -77,16 +78,21 @@ def axes_of(scene: Scene) -> Floats:
     return np.asarray(np.array(it.axes))
 
 
-def choices(lit: Scene, point: Floats, precision: Precision, lanes: int, count: int = 1 << 13) -> Floats:
-    """Ways, shape (n, 3), densities, those of meeting them, and weights: rows of 6 numbers."""
-    kernels = SmallKernels(
+@cache
+def _kernels(precision: Precision, lanes: int, defines: tuple[tuple[str, object], ...]) -> SmallKernels:
+    return SmallKernels(
         choose(),
         _TEXT,
         precision,
         lanes,
         generated={"structs.h": struct_text() + CUT_PLANE.c_text()},
-        defines={"PALETTE_SIZE": 256, **object_defines(lit)},
+        defines={"PALETTE_SIZE": 256, **dict(defines)},
     )
+
+
+def choices(lit: Scene, point: Floats, precision: Precision, lanes: int, count: int = 1 << 13) -> Floats:
+    """Ways, shape (n, 3), densities, those of meeting them, and weights: rows of 6 numbers."""
+    kernels = _kernels(precision, lanes, tuple(object_defines(lit).items()))
     given = kernels.planes(np.clip(qmc.Sobol(3, seed=3).random(count), 1e-6, 1 - 1e-6).T)
     out, records = np.full((6, count), np.nan, precision), object_records(lit, precision)
     kernels.run("look", given, out, records, *kernels.scalars(point), np.int32(count), result=out)
@@ -99,7 +105,7 @@ def moments(directions: Floats, about: Floats) -> Floats:
     return np.asarray(np.concatenate([np.ones((len(offset), 1)), offset, offset**2], axis=1))
 
 
-def expected(lit: Scene, point: Floats, hits: Hits, rays: int = 1 << 19) -> tuple[Floats, Floats]:
+def expected(lit: Scene, point: Floats, hits: Hits, rays: int = 1 << 17) -> tuple[Floats, Floats]:
     """Integrals over all directions that meet the object, evenly spread in a cone around it; and the cone's axis."""
     (it,) = lit.objects.values()
     middle = np.array(it.position)

@@ -119,12 +119,15 @@ MIDDLE = np.array([0.3, -0.2, 2.0])
 SIDE, UPWARD = 1.5 * np.array([0.8, 0.6, 0]), 0.5 * np.array([-0.6, 0.8, 0])
 
 
+@cache
+def window_kernels(precision: Precision, lanes: int) -> SmallKernels:
+    structs = {"structs.h": LIGHT.c_text()}
+    return SmallKernels(choose(), _TEXT, precision, lanes, generated=structs, defines={"PALETTE_SIZE": 256})
+
+
 def looks(point: Floats, numbers: Floats, precision: Precision, lanes: int) -> tuple[Floats, Floats]:
     """Directions, shape (n, 3), and densities."""
-    structs = {"structs.h": LIGHT.c_text()}
-    kernels = SmallKernels(
-        choose(), _TEXT, precision, lanes, generated=structs, defines={"PALETTE_SIZE": 256}
-    )
+    kernels = window_kernels(precision, lanes)
     values: dict[str, Any] = {
         field.name: (0.0,) * field.count if field.count else 0 for field in LIGHT.fields
     }

@@ -59,8 +59,12 @@ def test_what_is_cut_out_or_in_common(device: Device, formula: dict[str, Any], k
 
 
 @pytest.mark.parametrize("way", WAYS)
-@pytest.mark.parametrize(("precision", "lanes"), one_of(("float32", 4), ("float32", 1), ("float64", 4)))
-def test_each_search_and_number_type(device: Device, way: str, precision: Precision, lanes: int) -> None:
+@pytest.mark.parametrize(
+    ("precision", "lanes"), one_of(("float32", None), ("float32", 4), ("float32", 1), ("float64", 4))
+)
+def test_each_search_and_number_type(
+    device: Device, way: str, precision: Precision, lanes: int | None
+) -> None:
     objects = {
         "hole": {**SIMPLE["sphere"][0], "join": "cut"},
         "other": {

@@ -215,9 +215,11 @@ def test_every_number_of_a_pixel_is_kept_under_its_own_name(device: Device) -> N
 AROUND = {"color": [1, 0.5, 0.1], "intensity": 0.25, "width": 0.05}
 
 
-@pytest.mark.parametrize("lanes", one_of(4, 1))
+@pytest.mark.parametrize("lanes", one_of(None, 1, 4))
 @pytest.mark.parametrize(("mist", "points"), one_of((False, 1), (True, 1), (False, 4)))
-def test_the_glow_is_light_that_is_seen_at_once(device: Device, lanes: int, mist: bool, points: int) -> None:
+def test_the_glow_is_light_that_is_seen_at_once(
+    device: Device, lanes: int | None, mist: bool, points: int
+) -> None:
     """The layers have it too: before the surface, and where rays meet nothing. What the set reflects of it is direct."""
     more: dict[str, Any] = {"fog": {"color": [0, 0, 0], "density": 0.3}} if mist else {}
     scene = scene_of(

@@ -244,6 +244,7 @@ def ball_object(formula: dict[str, Any], **values: Any) -> dict[str, Any]:
 
 
 SHADOWS = one_of(
+    (QUICK_BALL, "path", "distance", "float32", None),
     (QUICK_BALL, "path", "distance", "float32", 4),
     (BALL, "path", "distance", "float32", 4),
     (QUICK_BALL, "direct", "steps", "float32", 4),
@@ -255,7 +256,7 @@ SHADOWS = one_of(
 
 @pytest.mark.parametrize(("formula", "mode", "search", "precision", "lanes"), SHADOWS)
 def test_a_small_ball_has_its_own_shadow(
-    device: Device, formula: dict[str, Any], mode: str, search: str, precision: Precision, lanes: int
+    device: Device, formula: dict[str, Any], mode: str, search: str, precision: Precision, lanes: int | None
 ) -> None:
     """A ball of six pixels in a formula's ball that is three times as large."""
     formula = {**formula, "bounds": {"center": [0, 0, 0], "radius": 3}}

@@ -13,7 +13,7 @@ from clfractal.device.structs import Precision
 from tests.render.objects_oracle import NOWHERE, light_of, met
 from tests.render.shots import BALL, PERSPECTIVE, colors, normals_of, points_of, rays, shoot
 from tests.scenes import scene_of
-from tests.variants import one_of
+from tests.variants import combinations, one_of
 
 WHITE = {"base": {"color": [1, 1, 1]}, "specular": {"weight": 0}}
 FLOOR = {"type": "plane", "position": [0, 0, -0.5], "material": "white"}
@@ -22,8 +22,9 @@ DULL = {"ambient": 0, "diffuse": 1, "specular": 0, "color": [1, 1, 1]}
 FROM_ABOVE = {**PERSPECTIVE, "position": [1.0, -1.8, 2.0]}
 
 
-@pytest.mark.parametrize("mode", ["direct", "path"])
-@pytest.mark.parametrize("lanes", [None, 1])
+@pytest.mark.parametrize(
+    ("mode", "lanes"), [("direct", None), ("path", None), ("direct", 1), *combinations([("path", 1)])]
+)
 def test_shadow_of_a_ball_on_a_plane(device: Device, mode: str, lanes: int | None) -> None:
     way = np.array([0.5, 0.3, -1.0])
     scene = scene_of(
@@ -284,6 +285,7 @@ PLACES = {
     "from afar": ((0.0, 0.0, 0.0), 3000.0, True),
 }
 WAYS = one_of(
+    ("near", "path", "float32", None),
     ("near", "path", "float32", 4),
     ("far out", "path", "float32", 4),
     ("from afar", "direct", "float32", 4),
@@ -295,7 +297,7 @@ WAYS = one_of(
 @pytest.mark.parametrize("kind", OBJECTS)
 @pytest.mark.parametrize(("place", "mode", "precision", "lanes"), WAYS)
 def test_no_object_is_in_its_own_shadow(
-    device: Device, kind: str, place: str, mode: str, precision: Precision, lanes: int
+    device: Device, kind: str, place: str, mode: str, precision: Precision, lanes: int | None
 ) -> None:
     """What faces a sun has the cosine's light, at every angle and from every distance."""
     middle, far, parallel = PLACES[place]

@@ -220,14 +220,14 @@ DOUBLE: Variant = ("float64", None)
 @pytest.mark.parametrize(
     ("scene", "usual", "others", "off"),
     [
-        (SCENES["volume"], SINGLE, [("float32", 1), DOUBLE], 0.005),
-        (SCENES["fog"], SINGLE, [("float32", lanes) for lanes in (4, 8, 16)], 0.005),
+        (SCENES["volume"], SINGLE, [DOUBLE], 0.005),
+        (SCENES["fog"], SINGLE, [("float32", 4)], 0.005),
         (FEW["hast"], SINGLE, [DOUBLE], 0.005),
         (COUNTS, DOUBLE, [("float64", 1)], 0.001),
         *combinations(
             [
-                (SCENES["volume"], SINGLE, [("float32", lanes) for lanes in (4, 8, 16)], 0.005),
-                (SCENES["fog"], SINGLE, [("float32", 1)], 0.005),
+                (SCENES["volume"], SINGLE, [("float32", lanes) for lanes in (1, 4, 8, 16)], 0.005),
+                (SCENES["fog"], SINGLE, [("float32", lanes) for lanes in (1, 8, 16)], 0.005),
                 (SCENES["mandelbulb"], SINGLE, [("float32", lanes) for lanes in (1, 4, 8, 16)], 0.005),
                 (FEW["mandelbulb"], SINGLE, [DOUBLE], 0.005),
             ]
