@@ -113,7 +113,7 @@ class Farm:
         options = ["--host", "127.0.0.1", "--port", str(self.port), "--no-dashboard", "--no-show"]
         options += ["--protocol", self._protocol, *self._options]
         self.scheduler = self._start("distributed.cli.dask_scheduler", options, {}, "scheduler")
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 120
         while time.monotonic() < deadline:
             with suppress(OSError), socket.create_connection(("127.0.0.1", self.port), 1):
                 return
@@ -173,7 +173,7 @@ def end(process: subprocess.Popen[Any]) -> None:
     """Ends a process at once, and its children with it."""
     with suppress(OSError):
         os.killpg(process.pid, signal.SIGKILL)
-    process.wait(10)
+    process.wait(120)
 
 
 class Client(Running):
@@ -197,6 +197,6 @@ class Client(Running):
         return self.process.poll() is None
 
 
-def journal_grows(folder: Path, name: str = "out.exr.partial", least: int = 1, seconds: float = 60) -> None:
+def journal_grows(folder: Path, name: str = "out.exr.partial", least: int = 1, seconds: float = 120) -> None:
     """Waits until so many tiles lie in a journal."""
     wait_until(has_tiles(folder / name, least), seconds=seconds)

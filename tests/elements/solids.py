@@ -208,7 +208,7 @@ def check_choices(known: Known, own: list[float], precision: Precision, lanes: i
     """Even light is found in all directions from a place, in half axes; what it hides of itself is in its own shadow."""
     lit = shining(known.written)
     point = np.array(known.position) + np.array(own) @ axes_of(lit)
-    right, axis = expected(lit, point, known.met, 1 << 17)
+    right, axis = expected(lit, point, known.met, 1 << 15)
     rows = choices(lit, point, precision, lanes)
     way, density, by_chance = rows[:, :3], rows[:, 3], rows[:, 4]
     far = np.linalg.norm(way, axis=1)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -84,10 +85,11 @@ def batch_text(formulas: Sequence[FormulaText], tail: str) -> str:
     return HEAD + "\n".join(parts)
 
 
+@lru_cache(maxsize=8)
 def formula_kernels(
-    device: Device, text: str, precision: Precision, lanes: int, flags: Sequence[str] = ()
+    device: Device, text: str, precision: Precision, lanes: int, flags: tuple[str, ...] = ()
 ) -> SmallKernels:
-    """The program of a generated text."""
+    """The program of a generated text, which tests in turn ask for again."""
     return SmallKernels(device, text, precision, lanes, generated={"structs.h": struct_text()}, flags=flags)
 
 

@@ -20,6 +20,7 @@ from clfractal.formulas.nodes import Call, Name, Node, Number
 from clfractal.formulas.products import Value
 from tests.devices import check_usable
 from tests.formulas.orbits import SPECS, orbit, texts
+from tests.variants import one_of
 
 OPERATIONS: dict[str, Callable[..., Any]] = {
     "add": lambda a, b: a + b,
@@ -109,7 +110,7 @@ def test_each_way_to_add_a_product(text: str, expected: list[str]) -> None:
     assert written(text) == expected
 
 
-@pytest.mark.parametrize("precision", ["float32", "float64"])
+@pytest.mark.parametrize("precision", one_of("float32", "float64"))
 @pytest.mark.parametrize("form", ["operations", "jacobian"])
 # (Of exponents that are data, complex powers over duals go another way.)
 @pytest.mark.parametrize("name", sorted(set(SPECS) - {"mandelbulb, turned", "mandelbulb, Julia"}))

@@ -106,20 +106,30 @@ def moments(directions: Floats, about: Floats) -> Floats:
 
 
 def expected(lit: Scene, point: Floats, hits: Hits, rays: int = 1 << 17) -> tuple[Floats, Floats]:
-    """Integrals over all directions that meet the object, evenly spread in a cone around it; and the cone's axis."""
+    """Integrals over all directions that meet the object, evenly spread in a cone around it; and the cone's axis.
+
+    Args:
+        rays: how many, or four times as many, until enough meet it.
+    """
     (it,) = lit.objects.values()
     middle = np.array(it.position)
     reach, away = np.linalg.norm(axes_of(lit)), np.linalg.norm(middle - point)
     cosine = math.sqrt(1 - (reach / away) ** 2) if reach < away else -1.0
     spread = (reach / away) ** 2 / (1 + cosine) if reach < away else 2.0
-    u, v = qmc.Sobol(2, seed=5).random(rays).T
-    low = spread * u
-    wide, turn = np.sqrt(low * (2 - low)), 2 * np.pi * v
     axis = (middle - point) / away
     side = np.cross(axis, [0.6, -0.48, 0.64])
     side /= np.linalg.norm(side)
     up = np.cross(axis, side)
-    ways = np.outer(1 - low, axis) + np.outer(wide * np.cos(turn), side) + np.outer(wide * np.sin(turn), up)
-    hit = np.isfinite(hits(np.broadcast_to(point, ways.shape), ways))
+    while True:
+        u, v = qmc.Sobol(2, seed=5).random(rays).T
+        low = spread * u
+        wide, turn = np.sqrt(low * (2 - low)), 2 * np.pi * v
+        ways = (
+            np.outer(1 - low, axis) + np.outer(wide * np.cos(turn), side) + np.outer(wide * np.sin(turn), up)
+        )
+        hit = np.isfinite(hits(np.broadcast_to(point, ways.shape), ways))
+        if hit.sum() > 4000 or rays >= 1 << 19:
+            break
+        rays *= 4
     assert hit.sum() > 1000
     return moments(ways, axis)[hit].sum(axis=0) * (2 * np.pi * spread / len(ways)), axis

@@ -129,7 +129,7 @@ def test_films_are_rendered_in_turn_and_the_window_ends_them(tmp_path: Path, dev
     _until(lambda: first.done >= 1, queue)
     begun = time.monotonic()
     (line,) = queue.close()
-    assert time.monotonic() - begun < 30  # to finish it would take minutes
+    assert time.monotonic() - begun < 60  # to finish it would take minutes
     assert "one_####.png: interrupted with" in line
     assert not first.running
     assert second.cancelled
@@ -287,7 +287,7 @@ def test_many_frames_are_counted_in_a_moment(tmp_path: Path, monkeypatch: pytest
     order = FilmOrder("", tmp_path, tmp_path / "f.mp4", 0, 35_999, "0:0")
     begun = time.process_time()
     assert len(order.there()) == 36_000
-    assert time.process_time() - begun < 0.2
+    assert time.process_time() - begun < 3  # each beside all others would take minutes
 
 
 def test_frames_of_an_earlier_run_do_not_count_unless_it_is_continued(

@@ -95,7 +95,7 @@ def test_a_still_is_cancelled_soon_and_writes_nothing(device: Device, tmp_path: 
         start = time.perf_counter()
         still.cancel()
         watch.rest()
-        assert time.perf_counter() - start < 20  # to finish it would take minutes
+        assert time.perf_counter() - start < 60  # to finish it would take minutes
         assert (still.finished, still.cancelled, still.problem) == (True, True, "")
     assert not list(tmp_path.iterdir())
 

@@ -162,8 +162,8 @@ def test_empty_cubes_are_quick() -> None:
     empty_cubes(table)
     start = time.process_time()
     empty_cubes(table)
-    # A tenth of this is usual.
-    assert time.process_time() - start < 0.1
+    # A hundredth of this is usual; one place after the other would take seconds.
+    assert time.process_time() - start < 1
 
 
 @pytest.mark.conformance

@@ -121,7 +121,7 @@ class Display:
     def ask(self, *command: str, check: bool = False) -> str:
         """Runs a program that talks with the server; what it prints."""
         ended = subprocess.run(
-            command, env=self.environment(), capture_output=True, text=True, timeout=30, check=False
+            command, env=self.environment(), capture_output=True, text=True, timeout=120, check=False
         )
         assert not check or ended.returncode == 0, (command, ended.stderr)
         return ended.stdout
@@ -147,7 +147,7 @@ class Display:
                     each.wait(10)
 
     def _wait_for_manager(self) -> None:
-        deadline = time.monotonic() + 20
+        deadline = time.monotonic() + 120
         # Answered by window managers alone.
         while not self.xdotool("get_desktop", check=False).strip():
             assert time.monotonic() < deadline, "openbox does not answer"

@@ -30,7 +30,7 @@ def interrupted(window: Window) -> float:
     """Ctrl-C; how long it took."""
     start = time.monotonic()
     window.interrupt()
-    ended = window.ended(20)
+    ended = window.ended()
     seconds = time.monotonic() - start
     assert (ended.status, ended.out, ended.err) == (130, "", "clfractal: interrupted\n")
     return seconds
@@ -72,7 +72,7 @@ def test_ctrl_q_closes_it(display: Display, folder: Path) -> None:
         wait_for(lambda: window.pixels().any(), "a picture")
         window.move(200, 200)
         window.keys("ctrl+q")
-        ended = window.ended(20)
+        ended = window.ended()
         assert (ended.status, ended.out, ended.err) == (0, "", "")
 
 
@@ -90,7 +90,7 @@ def test_the_display_goes_away(tmp_path_factory: pytest.TempPathFactory, folder:
         window.still()
         wait_for(lambda: list((cache / "autosave").glob("*.json")), "the safety copy")
         display.close()
-        assert window.ended(20).status != 0
+        assert window.ended().status != 0
     kept = Autosave(cache / "autosave").found()
     assert len(kept) == 1
     kept[0].release()

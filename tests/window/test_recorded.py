@@ -28,7 +28,7 @@ def test_played_events_lead_to_the_same_scene(display: Display, folder: Path) ->
         window.still()
         recorded = load_scene(window.save())
         window.keys("ctrl+q")
-        assert window.ended(20).status == 0
+        assert window.ended().status == 0
     (folder / "saved.yaml").unlink()
     # It takes the size of the recording, and closes after its last event.
     with Window(display, folder, "s.yaml", "--no-panels", "--play", "events.jsonl", open=False) as window:

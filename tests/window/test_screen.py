@@ -103,7 +103,7 @@ def test_a_window_for_each_eye(window: Window) -> None:
 def test_closed_by_the_window_manager(window: Window) -> None:
     window.display.xdotool("windowfocus", "--sync", window.id)
     window.keys("alt+F4")
-    ended = window.ended(20)
+    ended = window.ended()
     assert (ended.status, ended.out, ended.err) == (0, "", "")
 
 
@@ -119,4 +119,4 @@ def test_unsaved_changes_are_asked_about_before_it_closes(window: Window) -> Non
     window.still()
     assert window.process.poll() is None
     window.keys("alt+F4")  # yes
-    assert window.ended(20).status == 0
+    assert window.ended().status == 0
