@@ -298,7 +298,7 @@ def test_long_commands(tmp_path: Path, arguments: tuple[str, ...]) -> None:
         pytest.importorskip("distributed")
     work = begun(tmp_path, *arguments, "--quiet")
     work.wait_until_it_listens()
-    work.wait_until(_after(2.0))
+    work.wait_until(_after(1.0))
     status, told = work.ended_by(signal.SIGTERM)
     assert status == 143, told
     assert re.fullmatch(r"[^\n]*(interrupted|no longer watched)[^\n]*\n", told), told

@@ -38,14 +38,13 @@ animation:
 """
 FRAMES = 12
 
-# A worker that takes no second bundle before a file `go` is there.
+# A worker that takes no second bundle before a file `go` is there. (Dask may run this twice.)
 HELD = """
 import time
 from pathlib import Path
 from clfractal.engine.local_executor import LocalExecutor
-begun = []
 
-def held(*arguments, execute=LocalExecutor.execute):
+def held(*arguments, execute=LocalExecutor.execute, begun=[]):
     begun.append(arguments)
     while len(begun) > 1 and not Path("go").exists():
         time.sleep(0.005)

@@ -144,7 +144,7 @@ def test_late_workers_join_and_early_ones_go(folder: Path, picture: dict[str, by
 
 def test_interrupts_end_the_work_of_the_workers(folder: Path, farm: Farm) -> None:
     """A tile of minutes: its worker ends it as soon as nobody wants it."""
-    order = ["render", "heavy.yaml", "--set", "renderer.samples=200000", "-o", "out.exr"]
+    order = ["render", "heavy.yaml", "--set", "renderer.samples=65536", "-o", "out.exr"]
     with Client(folder, *order, "--cluster", farm.address) as client:
         wait_until(lambda: _at_work(farm))
         time.sleep(2)

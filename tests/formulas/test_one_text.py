@@ -152,7 +152,7 @@ def test_a_text_that_is_kept_is_what_would_be_written(many: list[Any], options: 
 
 @pytest.mark.parametrize("name", WITH_PARAMETERS)
 @given(data=st.data())
-@settings(max_examples=15)
+@settings(max_examples=8)
 def test_kept_texts_of_the_library(name: str, data: st.DataObject) -> None:
     found = chains_of([{"name": name, "parameters": drawn(data, name)} for _ in range(3)])
     anew = []

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from clfractal.device.select import choose, is_simulator
+from tests.variants import one_of
 
 pytestmark = pytest.mark.skipif(
     sys.platform != "linux", reason="glibc alone fills memory when it is asked to"
@@ -34,7 +35,7 @@ def _filled(name: str, byte: int, out: Path) -> np.typing.NDArray[np.float32]:
 
 # A cloud that the eye sees first, and a set that light walks within: both once had bits of what was there before.
 # (Every picture of `make portability` is compared so, too.)
-@pytest.mark.parametrize("name", ["volumes", "skin"])
+@pytest.mark.parametrize("name", one_of("volumes", "skin"))
 def test_pictures_know_nothing_of_what_was_in_memory(name: str, tmp_path: Path) -> None:
     if is_simulator(choose().info):
         pytest.skip("a simulator takes minutes for it")

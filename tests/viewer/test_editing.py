@@ -8,7 +8,7 @@ from functools import partial
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from clfractal.errors import ClfractalError, SceneError
@@ -185,6 +185,7 @@ def test_one_edit_after_the_other_is_as_the_whole(more: dict[str, Any]) -> None:
     first = load_scene({**RICH, **more})
 
     @given(st.lists(st.sampled_from(sorted(STEPS)), min_size=3, max_size=8), st.data())
+    @settings(max_examples=50)
     def walk(paths: list[str], data: st.DataObject) -> None:
         scene = first
         for path in paths:

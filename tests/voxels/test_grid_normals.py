@@ -19,6 +19,7 @@ from tests.devices import device
 from tests.render.levels import BESIDE, CAMERA, UNEVEN, along, degrees, onto_level, sizes, slopes
 from tests.render.shots import BALL, normals_of, points_of, shoot
 from tests.scenes import BALL_ITERATIONS, scene_of
+from tests.variants import one_of
 from tests.voxels.grids import Floats, decoded, filled, place_of, volume_scene, voxel_points
 
 BINOMIAL = {
@@ -193,9 +194,9 @@ def test_pictures_of_voxels_have_the_normals_of_the_last_z(
         assert np.percentile(angles, 90) < 0.1
 
 
-@pytest.mark.parametrize("lanes", [1, 4])
+@pytest.mark.parametrize("lanes", one_of(None, 1, 4))
 @pytest.mark.parametrize("value", ["inside", "coverage"])
-def test_zoomed_boxes_values_and_lanes(device: Device, value: str, lanes: int) -> None:
+def test_zoomed_boxes_values_and_lanes(device: Device, value: str, lanes: int | None) -> None:
     zoom = [{"center": [-0.3, -0.3, 0.1], "scale": 3}]
     renderer = {"type": "volume", "resolution": 128, "normals": "exact", "value": value, "zoom": zoom}
     scene = scene_of({"name": "hast", "iterations": 4}, CAMERA, (48, 36), renderer=renderer)
