@@ -16,6 +16,7 @@ from clfractal.formulas import catalog
 from tests.calls import raising
 from tests.makers import DOCS, maker
 from tests.shell import InProcess, command, environment, process, works
+from tests.variants import combinations
 
 COMMANDS = {str(each.name or each.callback.__name__) for each in app.registered_commands if each.callback}
 
@@ -33,15 +34,24 @@ def variables(shell: str, words: list[str]) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+SHELLS = ("bash", "zsh", "fish", "powershell")
+WORDS = [
+    (["ren"], "render"),
+    (["render", "--si"], "--size"),
+    (["render", "--quality", "fi"], "final"),
+    (["formulas", "menger_s"], "menger_sponge"),
+    (["scenes", "stereo_h"], "stereo_hall"),
+]
+
+
+# Of a shell depends how it asks and is answered, of a word what is found: each shell has two of the words.
 @pytest.mark.parametrize(
-    ("words", "wanted"),
+    ("shell", "words", "wanted"),
     [
-        (["ren"], "render"),
-        (["render", "--si"], "--size"),
-        (["render", "--quality", "fi"], "final"),
-        (["formulas", "menger_s"], "menger_sponge"),
-        (["scenes", "stereo_h"], "stereo_hall"),
+        each if (number - SHELLS.index(shell)) % len(WORDS) < 2 else combinations([each])[0]
+        for number, word in enumerate(WORDS)
+        for shell in SHELLS
+        for each in [(shell, *word)]
     ],
 )
 def test_words_are_completed(shell: str, words: list[str], wanted: str, tmp_path: Path) -> None:
@@ -51,7 +61,7 @@ def test_words_are_completed(shell: str, words: list[str], wanted: str, tmp_path
     assert ended.err == ""
 
 
-@pytest.mark.parametrize("shell", ["bash", "zsh", "fish", "powershell"])
+@pytest.mark.parametrize("shell", SHELLS)
 def test_each_shell_has_its_script(shell: str, tmp_path: Path) -> None:
     ended = works(process([], tmp_path, {"_CLFRACTAL_COMPLETE": f"source_{shell}"}))
     assert "clfractal" in ended.out
