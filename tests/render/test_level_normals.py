@@ -42,8 +42,8 @@ def off(scene: Scene, places: Floats, normals: Floats, nearly: float = 1.002) ->
     """Angles to the slope of |z| at the limit, of hits on the surface itself: others have met a thread beside them."""
     limit, bailout = scene.formula.iterations, scene.chain.bailout
     size = sizes(scene.chain, places, limit)
-    on_it = (size <= scene.chain.distance_bailout).all(axis=0)
-    on_it &= (size[-1] > bailout) & (size[-1] < nearly * bailout)
+    on_it = (size[:-1] <= scene.chain.distance_bailout).all(axis=0)
+    on_it &= np.abs(size[-1] / bailout - 1) < nearly - 1
     assert on_it.sum() > 20
     return degrees(normals[on_it], slopes(scene.chain, places[on_it], limit))
 

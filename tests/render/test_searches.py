@@ -219,6 +219,30 @@ def test_other_steps(device: Device, name: str, step: float) -> None:
     assert (other.framebuffer["steps"][other.hit] <= ((other.t - first) / other.step)[other.hit] + 45).all()
 
 
+def test_powers_that_differ_from_place_to_place(device: Device) -> None:
+    """The Riemann sphere's radius grows by powers from 2 to 16. Three applications leave a smooth body: no orbit out of the
+    range of numbers may be taken for a wall before it, nor one power more beyond the limit for a rim that is not there."""
+    camera = {"position": [3.4, -1.6, -1.15], "target": [0, 0, 0], "fov": 30}
+    near, far = (
+        found_by(
+            device,
+            scene_of(
+                {"name": "riemann_sphere", "iterations": 3},
+                camera,
+                (SIDE, SIDE),
+                lights=[],
+                coloring={"by": "iterations"},
+                renderer={"search": search, "bounds": {"radius": 1.1}},
+            ),
+        )
+        for search in ("distance", "steps")
+    )
+    assert far.hit.mean() > 0.5
+    assert (near.hit == far.hit).mean() > 0.995
+    shared = near.hit & far.hit
+    assert (np.abs(near.t - far.t) < near.footprint + far.step)[shared].mean() > 0.995
+
+
 def test_steps_of_a_ball(device: Device) -> None:
     """The closed form: what a ray meets, to the precision of float32, unless it passes through less than a step of it."""
     scene = scene_of(BALL, ORTHOGRAPHIC, (SIDE, SIDE), renderer={"search": "steps"})
