@@ -36,7 +36,14 @@ SCENES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "mandelbulb": ("mandelbulb.yaml", ()),
     "hast": ("hast_rotated.yaml", ()),
     "mandelbox": ("mandelbox.yaml", ()),
-    "volume": ("volume_jade.yaml", ("renderer.resolution=256",)),
+    "volume": (
+        "volume_jade.yaml",
+        (
+            "lighting={mode: direct}",
+            "renderer={type: volume, box: {size: 2.8}, resolution: 256, value: coverage, store: float, shadows: true, "
+            "samples: 4, transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 0.4, opacity: 0.2}, {at: 1.0, opacity: 0.6}]}}",
+        ),
+    ),
     "cut_plane": ("cut_mandelbrot.yaml", ()),
 }
 """Rows of the table: a scene that is shipped, and values of it."""
