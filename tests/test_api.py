@@ -42,6 +42,7 @@ FUNCTIONS = {
     "distances": ["formula", "points"],
     "dump_scene": ["scene"],
     "escape": ["formula", "points", "iterations", "bailout"],
+    "find": ["scene", "count", "seed", "device"],
     "frames": ["scene", "device", "progress", "numbers"],
     "load_scene": ["source", "overrides", "folder"],
     "mesh": ["source", "device", "progress", "level"],

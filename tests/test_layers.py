@@ -28,6 +28,7 @@ OWNERS = {
             "list_facts",
             "list_grids",
             "list_pictures",
+            "list_proposals",
             "list_scenes",
             "list_window",
         )

@@ -110,6 +110,7 @@ REFUSED = {
     "mesh volume.yaml -o link.ply": f"link.ply: {READ}, but it is the file 'scan.nrrd'",
     "mesh scan.nrrd -o link.ply": f"link.ply: {READ}, but it is the file 'scan.nrrd'",
     "vary scene.yaml -o folder --sheet folder/scene-01.png": f"folder/scene-01.png: {TWICE}",
+    "find scene.yaml -o folder --sheet folder/scene-01.png": f"folder/scene-01.png: {TWICE}",
     "view scene.png --shot scene.png": f"scene.png: {READ}",
     "view scene.yaml --record scene.yaml": f"scene.yaml: {READ}",
     "view formula.yaml --save own.yaml": f"own.yaml: {READ}",

@@ -140,6 +140,7 @@ def test_files_that_a_piped_scene_names_lie_in_the_current_folder(here: Path, pi
         (["render", "S", "-o", "-.jpg", "--set", "background=transparent"], ">a JPEG has no transparency; write"),
         (["slices", "S", "-o", "-"], ">cannot be written to: slices are several files"),
         (["vary", "S", "-o", "-"], ">cannot be written to: variations are several files; name a folder"),
+        (["find", "S", "-o", "-"], ">cannot be written to: views are several files; name a folder"),
         (["vary", "S", "--sheet", "-"], ">cannot be written to: the sheet needs a file"),
         (["mesh", "S", "-o", "-.exr"], ">unknown extension '.exr'; known: .ply, .stl, .obj, .glb"),
         (["check", "-"], "standard input: holds no scene: it is empty"),

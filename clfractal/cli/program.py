@@ -11,7 +11,7 @@ from typing import Annotated
 import typer
 from typer.models import CommandInfo
 
-from clfractal.cli import list_facts, list_grids, list_pictures, list_scenes, list_window
+from clfractal.cli import list_facts, list_grids, list_pictures, list_proposals, list_scenes, list_window
 from clfractal.cli.completion import check_shell
 from clfractal.cli.options import app
 from clfractal.cli.progress import Patience
@@ -19,7 +19,16 @@ from clfractal.cli.shell import Shell
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_INTERRUPTED
 from clfractal.files import resources
 
-__all__ = ["app", "call", "list_facts", "list_grids", "list_pictures", "list_scenes", "list_window"]
+__all__ = [
+    "app",
+    "call",
+    "list_facts",
+    "list_grids",
+    "list_pictures",
+    "list_proposals",
+    "list_scenes",
+    "list_window",
+]
 
 # As `clfractal --help` lists them; a command that is missing here comes last.
 _ORDER = (
@@ -31,6 +40,7 @@ _ORDER = (
     "scenes",
     "new",
     "vary",
+    "find",
     "slices",
     "check",
     "probe",

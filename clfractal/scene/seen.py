@@ -113,6 +113,11 @@ class Seen:
         nearest = reduce(np.minimum, (body(points) for body in self._bodies))
         return np.asarray(reduce(np.maximum, (floor(points) for floor in self._floors), nearest))
 
+    def room(self, points: Floats) -> Floats:
+        """How far points are from all that hides, or less: below 0 where no camera can be, also behind floors."""
+        parts = [body(points) for body in self._bodies] + [-floor(points) for floor in self._floors]
+        return np.asarray(reduce(np.minimum, parts, np.full(len(points), np.inf)))
+
     def reaches(self, along: tuple[Vector, Vector, Vector], ways: Ways) -> list[float]:
         """As of every `Framed`."""
         towards = np.array(ways) @ np.array(along)
