@@ -1,4 +1,4 @@
-"""Scenes that a command proposes: numbered files, each with a small picture, or all in one sheet, to choose from."""
+"""Scenes that a command proposes to choose from: numbered files with small pictures, or a sheet of all."""
 
 from __future__ import annotations
 
