@@ -6,7 +6,8 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+
+from clfractal.records import dataclass, field
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,7 +10,6 @@ import contextlib
 import os
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -21,6 +20,7 @@ from clfractal.device import driver_files, drivers_folder
 from clfractal.device.groups import fitting
 from clfractal.device.select import Device, by_key, is_pocl
 from clfractal.errors import DeviceError
+from clfractal.records import dataclass
 
 BINARY = "binary"  # the file that `compile_job` leaves
 

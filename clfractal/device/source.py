@@ -10,12 +10,12 @@ import os
 import posixpath
 import re
 from collections.abc import Collection, Mapping
-from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 from clfractal.errors import KernelBuildError, Where, nearest
 from clfractal.files.resources import folder
+from clfractal.records import dataclass, field
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))')
 _NAME = re.compile(r"[A-Za-z_]\w*")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,6 +12,8 @@ if TYPE_CHECKING:
     from clfractal.images.framebuffer import Framebuffer
 
 Floats = npt.NDArray[np.float64]
+
+from clfractal.records import dataclass
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z")
 """What it is asked of."""

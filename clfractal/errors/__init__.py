@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+from clfractal.records import dataclass
 
 # Exit statuses of the shell (not sysexits: scripts only need to distinguish "fix the input" from "fix the machine").
 STATUS_BAD_INPUT = 2

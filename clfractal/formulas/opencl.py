@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any, Literal
 
@@ -23,6 +22,7 @@ from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number,
 from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.products import Value, literal
 from clfractal.formulas.turns import Span
+from clfractal.records import dataclass, field
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
 DualMap = Literal["operations", "jacobian", "cheapest"]

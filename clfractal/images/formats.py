@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -11,6 +10,7 @@ from clfractal.errors import FileError, Where
 from clfractal.files import atomic
 from clfractal.files.photo import LOSSLESS, MOST_PIXELS, Format
 from clfractal.images.modes import PICKED, picture_size
+from clfractal.records import dataclass
 from clfractal.scene.stereo import Stereo
 
 if TYPE_CHECKING:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from clfractal.camera.views import View
+from clfractal.records import dataclass
 
 Triple = tuple[float, float, float]
 

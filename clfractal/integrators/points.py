@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from contextlib import closing
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,6 +20,7 @@ from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
 from clfractal.geometry.solids import Body
 from clfractal.integrators.declarations import struct_text
+from clfractal.records import dataclass
 
 Floats = npt.NDArray[np.float64]
 

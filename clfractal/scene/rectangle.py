@@ -1,11 +1,12 @@
 """A rectangle in space: where a cut plane lies, and how it is moved and rotated."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
+from clfractal.records import dataclass
 from clfractal.schema.base import (
     Angle,
     Coordinate,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -16,6 +15,7 @@ from clfractal.device.select import Device
 from clfractal.engine.show import Look, Shower
 from clfractal.errors import ClfractalError
 from clfractal.images.tiled import Floats
+from clfractal.records import dataclass
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.preparing import internal_error
 

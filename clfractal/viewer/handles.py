@@ -7,7 +7,6 @@ where it is.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 from typing import cast
 
@@ -16,6 +15,7 @@ import numpy.typing as npt
 
 from clfractal.camera.views import View
 from clfractal.elements.lights.directional import DirectionalLight
+from clfractal.records import dataclass
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST
 from clfractal.schema.light import LightBase as Light

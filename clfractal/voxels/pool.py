@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.select import Device
+from clfractal.records import dataclass
 from clfractal.voxels.lattice import BRICK_STRIDE
 
 MOST_PARTS = 4
