@@ -9,13 +9,14 @@ import os
 import zlib
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 import png
 
 from clfractal.files.atomic import ContentError, atomic_writer, reading
+from clfractal.files.read_ahead import read_ahead
 from clfractal.files.srgb import Bits, codes
 
 Floats = npt.NDArray[np.float32]
@@ -137,12 +138,19 @@ def stream_png(
 
 
 def _rows(bands: Iterable[Floats], bits: Bits, alpha: bool, origin: tuple[int, int]) -> Iterator[bytes]:
-    """The rows as the file's bytes."""
+    """The rows as the file's bytes; their numbers are found while those before are compressed."""
+    for code in read_ahead(_codes(bands, bits, alpha, origin)):
+        for row in code:
+            yield row.tobytes()
+
+
+def _codes(
+    bands: Iterable[Floats], bits: Bits, alpha: bool, origin: tuple[int, int]
+) -> Iterator[npt.NDArray[Any]]:
     left, top = origin
     for band in bands:
         code = codes(band, bits, alpha=alpha, origin=(left, top))
-        for row in code.astype(">u2") if bits == 16 else code:
-            yield row.tobytes()
+        yield code.astype(">u2") if bits == 16 else code
         top += len(band)
 
 

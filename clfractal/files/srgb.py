@@ -37,11 +37,19 @@ def decode(code: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
 @cache
 def table8() -> npt.NDArray[np.uint16]:
     """Code values in 1/256 of an 8-bit step (0 to 65280) for every index from `TABLE_LOWEST` to `TABLE_ONE`."""
-    index = np.arange(TABLE_LOWEST, TABLE_ONE + 1, dtype=np.int32)
-    # The middle of the interval of floats that share an index, but 1 itself for the last one.
+    steps = 1 << (23 - TABLE_SHIFT)
+    index = np.arange(TABLE_LOWEST, TABLE_LOWEST + steps, dtype=np.int32)
+    # The middle of each interval of floats that share an index, of the lowest power of 2; the others are multiples, and
+    # a product is much less than a root.
     middle = ((index << TABLE_SHIFT) + (1 << (TABLE_SHIFT - 1))).view(np.float32).astype(np.float64)
-    table = np.rint(encode(np.minimum(middle, 1.0)) * 255 * 256).astype(np.uint16)
-    table[0] = 0
+    octaves = 2.0 ** np.arange((TABLE_ONE - TABLE_LOWEST) // steps)[:, None]
+    code = middle ** (1 / 2.4) * (1.055 * octaves ** (1 / 2.4)) - 0.055
+    linear = middle * octaves
+    np.multiply(linear, 12.92, out=code, where=linear <= 0.0031308)
+    code *= 255 * 256
+    table = np.empty(code.size + 1, np.uint16)
+    table[:-1] = np.rint(code, out=code).reshape(-1)
+    table[0], table[-1] = 0, 255 * 256  # the last one is of 1 itself
     return table
 
 
@@ -54,10 +62,15 @@ def _pattern(columns: int, components: int, left: int) -> npt.NDArray[np.uint16]
     """
     order = np.zeros((1, 1), dtype=np.int64)
     for _ in range(4):
-        order = np.block([[4 * order, 4 * order + 2], [4 * order + 3, 4 * order + 1]])
-    thresholds = 4 + order * 248 // 256
-    wide = thresholds[np.arange(32) % 16][:, (np.arange(columns) + left) % 16]
-    return np.repeat(wide[:, :, None], components, axis=2).astype(np.uint16)
+        order = np.concatenate(
+            [
+                np.concatenate([4 * order, 4 * order + 2], axis=1),
+                np.concatenate([4 * order + 3, 4 * order + 1], axis=1),
+            ]
+        )
+    thresholds = (4 + order * 248 // 256).astype(np.uint16)
+    places = (np.arange(columns * components) // components + left) % 16
+    return np.tile(thresholds.take(places, axis=1), (2, 1)).reshape(32, columns, components)
 
 
 def encode8(linear: Floats, *, origin: tuple[int, int] = (0, 0)) -> npt.NDArray[np.uint8]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import io
 from collections.abc import Collection, Iterable, Iterator, Mapping
-from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,6 +14,7 @@ from clfractal.errors import Where, arguments
 from clfractal.files.channels import CHANNELS, VIEWS, check_channels, in_view
 from clfractal.files.photo import LOSSLESS, write_photo
 from clfractal.files.png import stream_png, write_png
+from clfractal.files.read_ahead import read_ahead
 from clfractal.files.srgb import Bits
 from clfractal.files.tone_names import Tone
 from clfractal.images.develop import Development, developed
@@ -83,9 +83,10 @@ def save_outputs(
                 if kind == "PNG"
                 else partial(write_photo, format=PHOTOS[kind], quality=quality)
             )
+            colors = _colors(developed(store, development), alpha=alpha)
             write(
                 path,
-                _read_ahead(_colors(developed(store, development), alpha=alpha)),
+                colors if kind == "PNG" else read_ahead(colors),
                 width=region.width,
                 height=region.height,
                 alpha=alpha,
@@ -215,15 +216,6 @@ def _colors(picture: Picture, *, alpha: bool) -> Iterator[Floats]:
     names = "RGBA" if alpha else "RGB"
     for _, band in picture.bands():
         yield np.stack([band[name] for name in names], axis=-1)
-
-
-def _read_ahead(bands: Iterator[Floats]) -> Iterator[Floats]:
-    """Bands that a thread reads while the caller writes those before."""
-    with ThreadPoolExecutor(1) as pool:
-        coming = pool.submit(next, bands, None)
-        while (band := coming.result()) is not None:
-            coming = pool.submit(next, bands, None)
-            yield band
 
 
 def _file_key(key: str) -> str:

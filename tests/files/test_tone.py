@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from clfractal.files import tone
+from clfractal.files import srgb, tone
 from clfractal.files.srgb import decode, encode, encode8, encode16
 from clfractal.files.tone import LUMINANCE, MIDDLE, WHITE, toned
 from clfractal.files.tone_names import TONES, Tone
@@ -270,6 +270,14 @@ def test_a_dark_gradient_does_not_band() -> None:
     assert np.abs(blocks.mean(axis=1) - wanted).max() < 12 / 256
     between = np.abs(wanted - np.rint(wanted)) > 0.1
     assert (blocks.min(axis=1) < blocks.max(axis=1))[between].all()
+
+
+def test_the_table_is_the_transfer_function_in_the_middle_of_each_interval() -> None:
+    index = np.arange(srgb.TABLE_LOWEST, srgb.TABLE_ONE + 1, dtype=np.int32)
+    middle = ((index << srgb.TABLE_SHIFT) + (1 << (srgb.TABLE_SHIFT - 1))).view(np.float32)
+    wanted = np.rint(srgb.encode(np.minimum(middle.astype(np.float64), 1.0)) * 255 * 256)
+    wanted[0] = 0
+    assert np.array_equal(srgb.table8(), wanted)
 
 
 def test_the_pattern_belongs_to_the_picture_not_to_the_crop() -> None:
