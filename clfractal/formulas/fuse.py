@@ -7,7 +7,9 @@ an orbit has the same values, and ends alike, whichever derivative goes with it.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Mapping
+from functools import partial
 
 from clfractal.formulas.products import Value
 
@@ -17,26 +19,20 @@ _PRODUCT = re.compile(
 _WORD = re.compile(r"\b[A-Za-z_]\w*\b")
 
 
-def _name(line: str) -> str:
-    found = _PRODUCT.match(line)
-    return found[1] if found else ""
+def _unless(names: set[str], statement: re.Match[str]) -> str:
+    return "" if statement[1] in names else statement[0]
 
 
 def without_unused(body: str) -> str:
     """The statements of one function without products that nothing uses but sums that took them."""
     while True:
-        uses: dict[str, int] = {}
-        for word in _WORD.findall(body):
-            uses[word] = uses.get(word, 0) + 1
+        uses = Counter(_WORD.findall(body))
         # A statement may be there twice: in a loop, and behind it.
-        written: dict[str, int] = {}
-        for found in _PRODUCT.finditer(body):
-            written[found[1]] = written.get(found[1], 0) + 1
+        written = Counter(_PRODUCT.findall(body))
         unused = {name for name, times in written.items() if uses[name] == times}
         if not unused:
             return body
-        lines = (each for each in body.splitlines(keepends=True) if _name(each) not in unused)
-        body = "".join(lines)
+        body = _PRODUCT.sub(partial(_unless, unused), body)
 
 
 def fused(

@@ -81,7 +81,15 @@ def tree_depth(node: Node) -> int:
 
 def names_in(node: Node) -> frozenset[str]:
     """Every name used in the tree."""
-    return frozenset(part.name for part in walk(node) if isinstance(part, Name))
+    found, pending = set(), [node]
+    # (As `walk`: writing a formula asks for them a thousand times.)
+    while pending:
+        here = pending.pop()
+        if isinstance(here, Name):
+            found.add(here.name)
+        elif isinstance(here, Call):
+            pending += here.arguments
+    return frozenset(found)
 
 
 def substitute(node: Node, replacements: dict[str, Node]) -> Node:
