@@ -14,6 +14,14 @@ if TYPE_CHECKING:
     from clfractal.engine.any_engine import AnyEngine
 
 
+def drivers_ahead(order: Order) -> None:
+    """Lets the drivers begin that an order will ask for, while what renders is loaded."""
+    if order.cluster is None:
+        from clfractal.device import ahead
+
+        ahead.begin()
+
+
 @contextmanager
 def engine_of(order: Order, shell: Shell) -> Iterator[AnyEngine]:
     """The engine on which an order is rendered; of a cluster it is closed at the end.
@@ -22,9 +30,7 @@ def engine_of(order: Order, shell: Shell) -> Iterator[AnyEngine]:
         ClfractalError: there is no such device or cluster.
     """
     if order.cluster is None:
-        from clfractal.device import ahead
-
-        ahead.begin()  # while the next line loads what renders
+        drivers_ahead(order)
         from clfractal.engine.engine import Engine
 
         yield Engine(order.device, tell=shell.say)

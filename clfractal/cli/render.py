@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from clfractal.cli.engines import engine_of, shares_of
+from clfractal.cli.engines import drivers_ahead, engine_of, shares_of
 from clfractal.cli.order import Order as Order
 from clfractal.cli.order import naming_options
 from clfractal.cli.pipes import STREAM, is_stream, piped
@@ -61,6 +61,7 @@ def render_files(order: Order, shell: Shell) -> None:
     start = time.perf_counter()
     region = _region(order.region)
     scene = ordered_scene(order)
+    drivers_ahead(order)
     check_outputs(order, scene, region)
     tell_reference(order, scene, shell)
     with engine_of(order, shell) as engine:
