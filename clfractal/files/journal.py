@@ -49,6 +49,7 @@ _LARGEST_IDENTITY = 16 << 20  # bytes
 _NOTE = 0xFFFFFFFF
 _INDEX_BITS = 24
 _MOST_DEVICES = 250
+_MOST_AT_ONCE = 128  # records that the system is given at a time; it takes a few hundred
 
 
 class Journal:
@@ -167,7 +168,7 @@ class Journal:
             raise ValueError(f"device {device}")
         shown = {key: str(value)[: self._payload // 16] for key, value in about.items()}
         text = json.dumps({**shown, "number": device}, ensure_ascii=False).encode()
-        self._write(_NOTE, text[: self._payload].ljust(self._payload, b"\0"))
+        self._write([(_NOTE, text[: self._payload].ljust(self._payload, b"\0"))])
         self.notes[device] = shown
 
     def append(self, tile_index: int, array: Floats, device: int = 0) -> None:
@@ -187,9 +188,31 @@ class Journal:
         else:
             stored = np.zeros((planes, SIDE, SIDE), dtype="<f4")
             stored[:, :rows, :columns] = array
-        self._place[tile_index] = self._write(tile_index | device << _INDEX_BITS, stored.tobytes())
+        self._place[tile_index] = self._write([(tile_index | device << _INDEX_BITS, stored.tobytes())])
         self.done[tile_index] = True
         self.provenance[tile_index] = device
+
+    def append_whole(self, tile_indices: Sequence[int], arrays: Floats, device: int = 0) -> None:
+        """Stores whole tiles, float32 of shape (tiles, channels, `SIDE`, `SIDE`): as `append` each of them, but many at a
+        time, without copies of them.
+        """
+        if arrays.shape[1:] != (len(self.channels), SIDE, SIDE):
+            raise ValueError(f"tiles of shape {arrays.shape} in a journal of {len(self.channels)} channels")
+        stored = np.ascontiguousarray(arrays, dtype="<f4")
+        for first in range(0, len(stored), _MOST_AT_ONCE):
+            indices = tile_indices[first : first + _MOST_AT_ONCE]
+            tiles = stored[first : first + _MOST_AT_ONCE]
+            parts = zip(indices, tiles.reshape(len(indices), -1).view(np.uint8), strict=True)
+            try:
+                place = self._write([(index | device << _INDEX_BITS, tile.data) for index, tile in parts])
+            except FileError:
+                # On a full disk those stay for which there is room.
+                for index, tile in zip(indices, tiles, strict=True):
+                    self.append(index, tile, device)
+            else:
+                self._place[indices] = range(place, place + len(indices))
+                self.done[indices] = True
+                self.provenance[indices] = device
 
     def tile(self, tile_index: int) -> Floats:
         """A stored tile: float32 of shape (channels, `SIDE`, `SIDE`).
@@ -222,14 +245,17 @@ class Journal:
             self.path.unlink()
         self.close()
 
-    def _write(self, index: int, payload: bytes) -> int:
-        """Appends a record, and gives its number."""
-        check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", index)))
+    def _write(self, records: Sequence[tuple[int, bytes | memoryview]]) -> int:
+        """Appends records of an index and a payload each, and gives the number of the first."""
+        parts: list[bytes | memoryview] = []
+        for index, payload in records:
+            check = zlib.crc32(payload, zlib.crc32(struct.pack("<I", index)))
+            parts += [_RECORD.pack(index, check), payload]
         offset = self._start + self._records * self._size
         with naming(self.path, "cannot be written"):
-            system.write_at(self._descriptor, [_RECORD.pack(index, check), payload], offset)
-        self._records += 1
-        return self._records - 1
+            system.write_at(self._descriptor, parts, offset)
+        self._records += len(records)
+        return self._records - len(records)
 
     def _record(self, number: int) -> tuple[int, Floats] | None:
         """Index and payload of a record; None if it is damaged or not all there."""

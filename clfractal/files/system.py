@@ -99,7 +99,7 @@ def read_at(descriptor: int, size: int, offset: int) -> bytes:
     return b"".join(pieces)
 
 
-def write_at(descriptor: int, parts: Sequence[bytes], offset: int) -> None:
+def write_at(descriptor: int, parts: Sequence[bytes | memoryview], offset: int) -> None:
     """Writes all bytes at `offset`, of which the system may take a piece at a time; the descriptor's place may change."""
     waiting = [memoryview(part) for part in parts]
     while waiting:

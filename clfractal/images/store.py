@@ -94,10 +94,17 @@ class JournalFramebuffer:
         Raises:
             FileError: the journal cannot be written (a full disk).
         """
-        number, boxes = self._number(render_device), self.grid.boxes(indices).tolist()
-        for index, (x, y, width, height), array in zip(indices.tolist(), boxes, framebuffer, strict=True):
+        number, boxes = self._number(render_device), self.grid.boxes(indices)
+        whole = (boxes[:, 2] == TILE) & (boxes[:, 3] == TILE)
+        if whole.any():
+            tiles = framebuffer if whole.all() else framebuffer[whole]
+            self.journal.append_whole(indices[whole].tolist(), tiles, number)
+            self.provenance.of_tiles[indices[whole]] = number
+        for place in np.flatnonzero(~whole).tolist():
+            x, y, width, height = boxes[place].tolist()
             top, left = y % TILE, x % TILE
-            self._append(index, array[:, top : top + height, left : left + width], number)
+            cut = framebuffer[place][:, top : top + height, left : left + width]
+            self._append(int(indices[place]), cut, number)
 
     def _number(self, render_device: RenderDevice | None) -> int:
         """A device's number in the journal, which notes it; 0: there is only one."""

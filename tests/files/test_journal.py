@@ -208,6 +208,34 @@ def test_full_disk_keeps_what_was_written(tmp_path: Path) -> None:
     assert np.array_equal(journal.tile(9), content(9))
 
 
+def test_many_tiles_at_a_time_are_stored_as_one_after_the_other(tmp_path: Path) -> None:
+    """More than the system is given at a time."""
+    indices = [7, *range(20, COUNT), 3]
+    tiles = np.stack([content(index) for index in indices])
+    one, many = (Journal.create(tmp_path / name, IDENTITY, CHANNELS, COUNT) for name in ("one", "many"))
+    for index, tile in zip(indices, tiles, strict=True):
+        one.append(index, tile, 2)
+    many.append_whole(indices, tiles, 2)
+    many.append(0, content(0))
+    assert np.array_equal(many.tile(3), content(3))
+    assert many.provenance[[7, 0]].tolist() == [2, 0]
+    one.append(0, content(0))
+    assert (tmp_path / "one").read_bytes() == (tmp_path / "many").read_bytes()
+    assert done(one) == done(many)
+    with pytest.raises(ValueError, match="a journal of"):
+        many.append_whole([1], tiles[:1, :1])
+
+
+def test_of_many_tiles_those_stay_that_a_full_disk_has_room_for(tmp_path: Path) -> None:
+    path = tmp_path / "a.partial"
+    journal = Journal.create(path, IDENTITY, CHANNELS, COUNT)
+    with file_size_limit(20000), pytest.raises(FileError, match="File too large"):
+        journal.append_whole([5, 6, 7], np.stack([content(index) for index in (5, 6, 7)]))
+    assert done(journal) == [5, 6]
+    journal.close()
+    assert done(resumed(path)) == [5, 6]
+
+
 def test_full_disk_at_the_start_leaves_the_earlier_journal(tmp_path: Path) -> None:
     path = filled(tmp_path / "a.partial", range(3))
     with pytest.raises(FileError, match="cannot be written"), file_size_limit(50):
