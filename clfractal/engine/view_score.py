@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.records import dataclass
+
 if TYPE_CHECKING:
     from clfractal.images.framebuffer import Framebuffer
 
 Floats = npt.NDArray[np.float64]
-
-from clfractal.records import dataclass
 
 CHANNELS = ("R", "G", "B", "A", "Z", "N.X", "N.Y", "N.Z")
 """What it is asked of."""
