@@ -26,24 +26,32 @@ INLINE real proof_reach(int goal) { return goal == GOAL_TOUCH ? R(1.0) : PROOF_R
 INLINE real proof_onward(int goal) { return goal == GOAL_TOUCH ? TOUCH_ONWARD : PROOF_ONWARD; }
 INLINE real proof_most(int goal) { return goal == GOAL_TOUCH ? TOUCH_STEPS : PROOF_STEPS; }
 
-// Lanes that prove a hit: arrived, given up, or one step further down. The lanes that march are the result.
-INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings, orbit_record orbit) {
+// Whether a probe so far from its place on the ray is beside the pixel. No look at it is needed to know that.
+INLINE mask proof_astray(const march *m, const sight *s, vec offset, int goal) {
+    const real along = vec_dot(offset, m->r.direction), reach = proof_reach(goal) * s->cone;
+    return less(reach * reach, vec_dot(offset, offset) - along * along);
+}
+
+// Lanes that prove a hit: those that have arrived. The lanes that march are the result.
+INLINE mask proof_step(march *m, const sight *s, march_record settings, orbit_record orbit) {
     const mask proving = m->proving & m->active;
     if (HAS_DERIVATIVE || !any_lane(proving)) return m->active;
     const real cone = s->cone;
-    const vec offset = vec_sub(s->point, s->on_ray);
     const mask close = less(potential(s->here.end, s->surface, orbit) * (real)(settings->set_radius), PROOF_LOW * cone);
-    const real arrival = pick(close, PROOF_ARRIVED * cone, PROOF_LANDED * cone);
-    const real along = vec_dot(offset, m->r.direction);
-    const real reach = proof_reach(goal) * cone;
-    const mask astray = less(reach * reach, vec_dot(offset, offset) - along * along);
-    const mask arrived = proving & (s->here.end.inside | less(s->near, arrival)) & ~astray;
-    const mask failed = proving & ~arrived & (astray | less_equal(proof_most(goal), m->probes));
+    const mask arrived = proving & (s->here.end.inside | less(s->near, pick(close, PROOF_ARRIVED, PROOF_LANDED) * cone));
     m->found.hit |= arrived;
     m->found.last = pick(arrived, m->low, m->found.last);
-    const real solid_t = m->t + along, apart = PROOF_AHEAD * cone;
+    const real solid_t = m->t + vec_dot(vec_sub(s->point, s->on_ray), m->r.direction), apart = PROOF_AHEAD * cone;
     m->found.t = pick(arrived, clamp(m->proved_t, solid_t - apart, solid_t + apart), m->found.t);
     m->active &= ~arrived;
+    const mask marching = m->active & ~m->proving;
+    m->proving &= ~arrived;
+    return marching;
+}
+
+// Lanes whose proof has failed go on along their rays.
+INLINE void proof_fail(march *m, const sight *s, mask failed, int goal) {
+    const real cone = s->cone;
     m->retry_t = pick(failed, m->t + PROOF_APART * cone, m->retry_t);
     m->retry_radius = pick(failed, PROOF_CLOSER * m->radius_before, m->retry_radius);
     const mask onward = failed & ~passed_between(m);
@@ -52,14 +60,15 @@ INLINE mask proof_step(march *m, const sight *s, int goal, march_record settings
     m->slope = pick(onward, R(-1.0), m->slope);
     m->landing |= failed;
     march_between(m, s, failed);
-    const mask marching = m->active & ~m->proving;
-    m->proving &= ~(arrived | failed);
-    return marching;
+    m->proving &= ~failed;
 }
 
-// Lanes that touched the solid begin a proof, and those under way go further down. The result are hits that need no proof: a
-// bracketed lane has seen the inside already, and what a neighbouring point of the pixel has proved need not be proved again.
-INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal, march_record settings) {
+// Lanes that touched the solid begin a proof, and those under way go further down; which have `failed` is put down: their way has led
+// too far, or leads beside the pixel now. The result are hits that need no proof: a bracketed lane has seen the inside already, and
+// what a neighbouring point of the pixel has proved need not be proved again.
+INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, real hit_t, int goal, march_record settings,
+                        mask *failed) {
+    *failed = touched & ~touched;
     if (HAS_DERIVATIVE) return touched;
     const mask done = touched & (bracketed | (is_point(m) & less(fabs(m->t - m->r.known), (real)(settings->known_reach) * s->cone)));
     const mask due = touched & ~done & (less_equal(m->retry_t, m->t) | less(s->radius, m->retry_radius));
@@ -80,5 +89,7 @@ INLINE mask proof_begin(march *m, const sight *s, mask touched, mask bracketed, 
     m->probe = vec_pick(goes_down, vec_along(s->point, down, downhill), m->probe);
     m->probe_downhill = vec_pick(goes_down, downhill, m->probe_downhill);
     m->probe_radius = pick(goes_down, s->radius, m->probe_radius);
+    *failed = (proving & less(proof_most(goal), m->probes)) | (goes_down & proof_astray(m, s, vec_sub(m->probe, s->on_ray), goal));
+    proof_fail(m, s, *failed, goal);
     return done;
 }

@@ -189,7 +189,7 @@ INLINE void march_act(march *m, sight s, int goal, march_record settings, orbit_
         return;
     }
     const real cone = s.cone, radius = s.radius;
-    const mask marching = proof_step(m, &s, goal, settings, orbit);
+    const mask marching = proof_step(m, &s, settings, orbit);
     // If this sphere does not touch the one before, something may lie between them, so go back to the end of the one
     // before (Keinert et al. 2014, sec. 3.1).
     const mask free = marching & less_equal((real)(REAL_LARGEST), m->high);
@@ -230,12 +230,13 @@ INLINE void march_act(march *m, sight s, int goal, march_record settings, orbit_
     real ahead = goal == GOAL_SURFACE ? least(s.near / most(GRAZING_SLOPE, -slope), GRAZING_MOST * cone) : R(0.0);
     ahead = pick(passed_between(m), R(0.0), ahead);
     const mask narrow = goal == GOAL_SURFACE ? bracketed & less_equal(m->high - m->low, (settings->lands ? BRACKETED : SEEN_BRACKETED) * cone) : inside;
-    const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings);
+    mask failed;
+    const mask done = narrow | proof_begin(m, &s, touched, bracketed, m->t + ahead, goal, settings, &failed);
     m->found.hit |= done;
     m->found.last = pick(done, m->low, m->found.last);
     m->found.t = pick(done, pick(touched, least(m->t + ahead, m->high), m->low), m->found.t);
     m->active &= ~done;
-    march_onward(m, &s, marching & ~proof_under_way(m), overshot, early, passed, slope, goal, settings);
+    march_onward(m, &s, marching & ~(proof_under_way(m) | failed), overshot, early, passed, slope, goal, settings);
     m->active &= less(m->t, m->r.far) & less(m->found.steps, (real)((scalar)settings->max_steps));
     // A lane that waits for others must not go on proving, or what it finds would depend on them.
     m->proving &= m->active | march_late(m);
