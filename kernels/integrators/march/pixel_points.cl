@@ -18,7 +18,8 @@ STAGE(send_points) {
     const touch touched = {end_of_cone.hit, end_of_cone.t};
     STATE_KEEP(s, cost, STATE_COUNTERS);
     STATE_KEEP(s, touched, STATE_TOUCH);
-    points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
+    if (points_may_meet(s, touched)) points_send(s, a, touched, eye_ray(&a, view), points_seed(&here.at, sample, w), w);
+    else points_skip(s, w);
 }
 
 // Makes interactions of what a pixel's points have met, in the place of `find_interactions`.
@@ -31,7 +32,8 @@ STAGE(join_points) {
     sighting at_first = {R(0.0), cost.steps};
     const ray r = eye_ray(&a, view);
     pixel_points points = points_begin(r, a.time, touched, points_seed(&here.at, sample, w), w);
-    for (int turn = 0; turn < settings->point_count; ++turn) {
+    const int added = points_may_meet(s, touched) ? settings->point_count : points_none(s, r, w);
+    for (int turn = 0; turn < added; ++turn) {
         const ray each = queue_ray(s.q, turn, s.slot);
         real object;
         vec place;

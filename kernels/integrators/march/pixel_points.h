@@ -36,6 +36,13 @@ INLINE pixel_points points_begin(ray pixel_ray, real time, touch touched, bits s
     return p;
 }
 
+// Whether points of a packet may meet anything. Past the set they may still meet objects.
+INLINE int points_may_meet(stage s, touch touched) { return s.q.objects || any_lane(mask_of(touched.touched)); }
+
+INLINE void points_skip(stage s, world w) {
+    for (int turn = 0; turn < w.settings->point_count; ++turn) queue_skip(s.q, turn, s.slot);
+}
+
 // Sends a ray for each point, from a little before where the pixel's cone touched on (for the search by steps: from the eye).
 INLINE void points_send(stage s, camera_sample a, touch touched, ray pixel_ray, bits seed, world w) {
     const real cone = pixel_ray.footprint + pixel_ray.spread * touched.t;
@@ -92,6 +99,14 @@ INLINE void points_add(stage s, pixel_points *p, int turn, ray r, ray_hit met, r
         const facet f = {vec_pick(found, met.normal, r.direction), met.hit};
         STATE_KEEP_ONE(s, f, STATE_FACET, turn);
     }
+}
+
+// Of a packet whose points meet nothing no normal counts. The result is how many points are added.
+INLINE int points_none(stage s, ray pixel_ray, world w) {
+    const facet f = {pixel_ray.direction, R(0.0)};
+    if (w.settings->normal != NORMAL_GRADIENT) return 0;
+    for (int i = 0; i < w.settings->point_count; ++i) STATE_KEEP_ONE(s, f, STATE_FACET, i);
+    return 0;
 }
 
 INLINE vec points_to_space(const pixel_points *p, vec a) {
