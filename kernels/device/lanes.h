@@ -155,6 +155,27 @@ INLINE scalar lanes_sum(real value) {
 #endif
 }
 
+// The largest of whole numbers of the lanes: of their halves, theirs, and so on.
+#define LARGER(a, b) ((a) < (b) ? (b) : (a))
+INLINE INTEGER lanes_most(mask value) {
+#if LANES == 1
+    return value;
+#else
+#if LANES == 16
+    const JOIN(INTEGER, 8) eight = LARGER(value.lo, value.hi);
+#elif LANES == 8
+    const mask eight = value;
+#endif
+#if LANES >= 8
+    const JOIN(INTEGER, 4) four = LARGER(eight.lo, eight.hi);
+#else
+    const mask four = value;
+#endif
+    const JOIN(INTEGER, 2) two = LARGER(four.lo, four.hi);
+    return LARGER(two.x, two.y);
+#endif
+}
+
 // The lanes of a packet as bits, lane i as 1 << i.
 #define ALL_LANES ((1u << LANES) - 1u)
 #define bits_count(bits) ((int)popcount((uint)(bits)))

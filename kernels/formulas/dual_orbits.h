@@ -22,7 +22,7 @@ INLINE void dual_orbit_begin(dual_orbit *o, dual_state *c, vec point, mask activ
     dual_start(point, k, c, &z);
     const real square = dual_state_square(z);
     o->z = dual_state_pick(late, o->z, z);
-    o->square_before = pick(late, o->square_before, square);
+    if (!LOGARITHMIC) o->square_before = pick(late, o->square_before, square);
     orbit_lanes_begin(&o->lanes, square, late, active, orbit);
 }
 
@@ -30,7 +30,7 @@ INLINE void dual_orbit_apply(int usual, dual_orbit *o, int n, dual_state c, orbi
     const dual_state next = dual_apply_by(usual, n, o->z, c, k);
     const mask alive = going_on(o->lanes.alive);
     o->z = dual_state_pick(alive, next, o->z);
-    o->square_before = pick(alive, o->lanes.square, o->square_before);
+    if (!LOGARITHMIC) o->square_before = pick(alive, o->lanes.square, o->square_before);
     lanes_applied(&o->lanes, dual_state_square(next), orbit);
 }
 

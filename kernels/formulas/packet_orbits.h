@@ -49,16 +49,11 @@ INLINE void lanes_look(orbit_lanes *o, orbit_record orbit) {
     const int next = o->count < limit ? limit : longest;
     o->look = min(next - o->count, ORBIT_LOOK);
 #else
-    scalar left[LANES];
-    lanes_store(to_reals(limit - o->count), left);
-    int look = ORBIT_LOOK;
-    for (uint bits = lanes_bits(o->alive); bits != 0;) {
-        const int lane = highest_bit(bits);
-        bits ^= 1u << lane;
-        const scalar here = left[lane] > S(0.0) ? left[lane] : left[lane] + (scalar)(orbit->longest - orbit->iterations);
-        if (here < (scalar)look) look = (int)here;
-    }
-    o->look = look;
+    const mask to_limit = limit - o->count;
+    // Where the limit is behind, until the longest one. The least of all is the largest with the other sign.
+    const mask left = to_limit + ((to_limit <= 0) & (longest - limit));
+    const INTEGER soonest = -lanes_most((o->alive & -left) | (~o->alive & (mask)(-ORBIT_LOOK)));
+    o->look = min((int)soonest, ORBIT_LOOK);
 #endif
 }
 

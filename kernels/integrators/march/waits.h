@@ -6,27 +6,6 @@ typedef struct {
     int applications;  // lanes with a ray, whose orbit had ended: in applications of the others
 } lane_waits;
 
-// The largest of whole numbers of the lanes: of their halves, theirs, and so on.
-#define LARGER(a, b) ((a) < (b) ? (b) : (a))
-INLINE INTEGER lanes_most(mask value) {
-#if LANES == 1
-    return value;
-#else
-#if LANES == 16
-    const JOIN(INTEGER, 8) eight = LARGER(value.lo, value.hi);
-#elif LANES == 8
-    const mask eight = value;
-#endif
-#if LANES >= 8
-    const JOIN(INTEGER, 4) four = LARGER(eight.lo, eight.hi);
-#else
-    const mask four = value;
-#endif
-    const JOIN(INTEGER, 2) two = LARGER(four.lo, four.hi);
-    return LARGER(two.x, two.y);
-#endif
-}
-
 // For how many applications each of these lanes has waited, whose orbits had `count`; orbits of lanes that had none have the least.
 INLINE mask orbit_waits(mask lanes, real count) {
 #if LANES == 1
