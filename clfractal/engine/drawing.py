@@ -24,6 +24,7 @@ from clfractal.images.tiles import TILE, TileGrid
 from clfractal.integrators.kept import Resources
 from clfractal.integrators.kernel import (
     BLOCK,
+    LANE_SHARE,
     STAGE_NUMBERS,
     STATE_PADDING,
     KernelArgument,
@@ -307,8 +308,15 @@ class Drawing:
             share = rays_of_item(lanes, rays, self.device.info.compute_units)
             numbers += [tiles.start, sent_by, wave * self.wave.turns + STATE_PADDING, stage.turns, share]
             numbers += [stage.numbers.get(name, 0) for name in STAGE_NUMBERS]
-            if stage.over != "pixels":
-                each = group[0] * (share if stage.over == "rays" else lanes)
+            if stage.over == "shares of pixels" and lanes > 1:
+                size = (-(-(end - first) * lanes // LANE_SHARE), len(tiles))
+            elif stage.over.endswith("rays"):
+                of_item = {
+                    "rays": share,
+                    "packets of rays": lanes,
+                    "shares of rays": LANE_SHARE if lanes > 1 else 1,
+                }
+                each = group[0] * of_item[stage.over]
                 size = (-(-rays // each) * group[0],)
         kernel.set_args(*arguments, *numbers)
         event = cl.enqueue_nd_range_kernel(self.device.queue, kernel, size, group)
@@ -412,7 +420,7 @@ class Drawing:
         arguments += [Argument("scalar", dtype="int32", value=0.0)] * numbers
         over = kernel.over(name)
         group = group_of(over, lanes, self.group)
-        size = (self.packets, 1) if over == "pixels" else group
+        size = (self.packets, 1) if over.endswith("pixels") else group
         return Warm(name, size, group, tuple(arguments))
 
 

@@ -80,4 +80,6 @@ def group_of(over: Over, lanes: int, group: int) -> tuple[int, ...]:
     """The size of a stage's work-groups, of which those over pixels have `group` work-items."""
     if over == "rays":
         return rays_group(lanes)
-    return (group, 1) if over == "pixels" else (group,)
+    if over.startswith("shares") and lanes > 1:
+        group = 1
+    return (group, 1) if over.endswith("pixels") else (group,)

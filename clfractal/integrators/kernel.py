@@ -28,6 +28,8 @@ KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 RAY_NUMBERS, MET_NUMBERS, OBJECT_NUMBERS = 12, 13, 5
 # Numbers between two columns of what is kept between stages: a power of 2 apart, all would lie in one place of a cache.
 STATE_PADDING = 80
+# Pixels or rays of which a work-item takes those for which there is something to do (`lane_shares.h`).
+LANE_SHARE = 256
 BLOCK = 8
 """Side of a block of pixels that share a cone, in pixels (`kernels/integrators/tiles.h`)."""
 WAVE_NUMBERS = ("first_tile", "wave", "queue_stride", "turns", "slice")
@@ -45,7 +47,7 @@ class ProgramText:
     kernels: tuple[str, ...]
 
 
-Over: TypeAlias = Literal["pixels", "rays", "packets of rays"]
+Over: TypeAlias = Literal["pixels", "shares of pixels", "rays", "packets of rays", "shares of rays"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +56,8 @@ class Stage:
 
     Attributes:
         kernel: its name.
-        over: what each work-item does: a packet of pixels; some rays of the queue; a packet of rays.
+        over: what each work-item does: a packet of pixels; LANE_SHARE of a tile's; some rays of the queue; a packet of
+            rays; LANE_SHARE of them. With single lanes shares are of one.
         turns: rays of each pixel in the queue that it reads.
         numbers: its last arguments, see `STAGE_NUMBERS`; 0 where they are missing.
         of: what has sent the rays of the queue: pixels, or blocks of BLOCK x BLOCK pixels.

@@ -15,6 +15,7 @@ from clfractal.geometry.solids import Body
 from clfractal.integrators import records
 from clfractal.integrators.declarations import struct_text
 from clfractal.integrators.kernel import (
+    LANE_SHARE,
     OBJECT_NUMBERS,
     RAY_NUMBERS,
     STATE_PADDING,
@@ -64,6 +65,7 @@ def state_defines(scene: Scene, plan: Plan) -> dict[str, object]:
         **pass_defines(plan),
         "PALETTE_SIZE": PALETTE_SIZE,
         "STATE_PADDING": STATE_PADDING,
+        "LANE_SHARE": LANE_SHARE,
         **object_defines(scene),
         **MAP_DEFINES,
     }

@@ -150,6 +150,8 @@ def most_turns(scene: Scene) -> int:
 
 # What work-items do of kernels that are not launched over pixels.
 OVER: dict[str, Over] = {
+    "scatter_paths": "shares of pixels",
+    "scatter_costly": "shares of pixels",
     "march_rays": "rays",
     "march_points": "rays",
     "step_rays": "rays",
@@ -161,7 +163,7 @@ OVER: dict[str, Over] = {
     "look_where_steps_end": "packets of rays",
     "look_inside_set": "packets of rays",
     "look_where_walks_end": "packets of rays",
-    "meet_objects": "packets of rays",
+    "meet_objects": "shares of rays",
     "look_at_objects": "packets of rays",
 }
 # Packets look at surfaces where they march.
@@ -220,7 +222,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     paths, faces = isinstance(scene.lighting, PathLighting), has_faces(scene)
 
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
-        return Stage(kernel, "pixels", turns, {"sample": sample, **numbers})
+        return Stage(kernel, OVER.get(kernel, "pixels"), turns, {"sample": sample, **numbers})
 
     def when(wanted: object, *stages: Stage) -> tuple[Stage, ...]:
         return stages if wanted else ()

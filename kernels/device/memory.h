@@ -37,6 +37,62 @@
     } while (0)
 #define RECALL_NUMBER(i) recalled_[i] = lanes_load(from_ + i * stride_);
 
+// The same of lanes that may stand apart: then each has its own place, counted from where `to` or `from` is. Two at one place hold the same.
+typedef struct {
+    int apart;            // 0: they stand in a row
+    OF_LANES(int) each;
+} lane_places;
+#if LANES == 1
+#define STAND_APART(at) 0
+#define EACH_LANE(DO)
+#else
+#define STAND_APART(at) (at).apart
+#endif
+#if LANES == 4
+#define EACH_LANE(DO) DO(0) DO(1) DO(2) DO(3)
+#elif LANES == 8
+#define EACH_LANE(DO) DO(0) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7)
+#elif LANES == 16
+#define EACH_LANE(DO) DO(0) DO(1) DO(2) DO(3) DO(4) DO(5) DO(6) DO(7) DO(8) DO(9) DO(a) DO(b) DO(c) DO(d) DO(e) DO(f)
+#endif
+INLINE real lanes_load_at(__global const scalar *from, const lane_places *at) {
+    if (!STAND_APART(*at)) return lanes_load(from);
+    real found = R(0.0);
+#define GATHER_LANE(i) found.s##i = from[at->each.s##i];
+    EACH_LANE(GATHER_LANE)
+    return found;
+}
+INLINE void lanes_store_at(real value, __global scalar *to, const lane_places *at) {
+    if (!STAND_APART(*at)) {
+        lanes_store(value, to);
+        return;
+    }
+#define SCATTER_LANE(i) to[at->each.s##i] = value.s##i;
+    EACH_LANE(SCATTER_LANE)
+}
+#define KEEP_NUMBERS_AT(thing, count, to, stride, at)                                   \
+    do {                                                                                \
+        if (STAND_APART(at)) {                                                          \
+            const real *kept_ = (thing);                                                \
+            __global scalar *to_ = (to);                                                \
+            const int stride_ = (stride);                                               \
+            const lane_places at_ = (at);                                               \
+            WRITTEN_OUT(count, KEEP_NUMBER_AT)                                          \
+        } else KEEP_NUMBERS(thing, count, to, stride);                                  \
+    } while (0)
+#define RECALL_NUMBERS_AT(thing, count, from, stride, at)                               \
+    do {                                                                                \
+        if (STAND_APART(at)) {                                                          \
+            real *recalled_ = (thing);                                                  \
+            __global const scalar *from_ = (from);                                      \
+            const int stride_ = (stride);                                               \
+            const lane_places at_ = (at);                                               \
+            WRITTEN_OUT(count, RECALL_NUMBER_AT)                                        \
+        } else RECALL_NUMBERS(thing, count, from, stride);                              \
+    } while (0)
+#define KEEP_NUMBER_AT(i) lanes_store_at(kept_[i], to_ + i * stride_, &at_);
+#define RECALL_NUMBER_AT(i) recalled_[i] = lanes_load_at(from_ + i * stride_, &at_);
+
 // Of lanes `here` one struct of numbers, of the others another: TYPE_pick.
 #define NUMBERS_PICKED(type)                                                                                                 \
     INLINE type type##_pick(mask here, type yes, type no) {                                                                 \

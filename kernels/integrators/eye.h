@@ -45,7 +45,7 @@ INLINE void send_to_set(stage s, int turn, ray r, real free, mask wanted, world 
     real face;
     wanted &= planes_cut(&r, &face, w.planes);
     wanted &= ray_clip(&r, w.settings->bounds_center, (real)(w.settings->bounds_radius));
-    lanes_store(r.near, s.q.rays + RAY_START * s.q.stride + turn * s.q.wave + s.slot);
+    lanes_store_at(r.near, s.q.rays + RAY_START * s.q.stride + turn * s.q.wave + s.slot, &s.q.lanes);
     r.near = fmax(r.near, free);
     queue_send(s.q, turn, s.slot, r, wanted);
 }
@@ -63,9 +63,9 @@ INLINE __global scalar *ray_strength(stage s, int turn) { return s.q.rays + RAY_
 INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask wanted, world w) {
     if (s.q.objects) {
         __global scalar *at = s.q.rays + turn * s.q.wave + s.slot;
-        lanes_store(pick(wanted, r.far, R(-1.0)), at + RAY_OBJECT * s.q.stride);
-        lanes_store(OBJECT_AWAITED, at + RAY_OBJECT_NUMBER * s.q.stride);
-        lanes_store(enough, at + RAY_OBJECT_PLACE * s.q.stride);
+        lanes_store_at(pick(wanted, r.far, R(-1.0)), at + RAY_OBJECT * s.q.stride, &s.q.lanes);
+        lanes_store_at(OBJECT_AWAITED, at + RAY_OBJECT_NUMBER * s.q.stride, &s.q.lanes);
+        lanes_store_at(enough, at + RAY_OBJECT_PLACE * s.q.stride, &s.q.lanes);
     }
     send_to_set(s, turn, r, free, wanted, w);
 }
@@ -84,10 +84,10 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     return r;
 }
 
-// Whether all paths of a packet ended at an earlier interaction, and no light that they sampled is awaited: nothing is left to do for them.
-// (What is kept says so from the second bounce on, and rays that are not sent stay so.)
-INLINE int paths_are_over(stage s) {
-    if (s.bounce < 2) return 0;
+// The lanes whose paths have not ended at an earlier interaction, or for which light that they sampled is awaited: nothing is left to do for
+// others. (What is kept says so from the second bounce on, and rays that are not sent stay so.)
+INLINE mask paths_left(stage s) {
+    if (s.bounce < 2) return less(R(0.0), R(1.0));
     // Of whole structs too much would be read.
     path so_far;
     const int on_path = s.at[STATE_PATH] + (int)(&so_far.on_path - (real *)&so_far);
@@ -96,7 +96,8 @@ INLINE int paths_are_over(stage s) {
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
     if (KEEPS(s, STATE_HALT)) left |= ~equal(lanes_load(state_part(s, STATE_HALT)), R(0.0));
-    return !any_lane(left);
+    return left;
 }
+INLINE int paths_are_over(stage s) { return !any_lane(paths_left(s)); }
 // The head of a stage along paths: packets end whose paths are over.
 #define PATH_STAGE_BEGINS(name, data) STAGE_BEGINS(name, data); if (paths_are_over(name)) return

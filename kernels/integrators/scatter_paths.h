@@ -1,5 +1,6 @@
 // Paths at their events: the stage SCATTER of a text that has said which costly parts its materials may have.
 #include "integrators/path_stages.h"
+#include "integrators/path_shares.h"
 
 // Goes on from an event, over the boundary of a body if the direction leads there; where that is hidden a path goes on as it came.
 INLINE void path_leaves(stage s, const packet_pixels *at, path *so_far, path_state *with, const event *e, const interaction *here, border edge,
@@ -14,13 +15,11 @@ INLINE void path_leaves(stage s, const packet_pixels *at, path *so_far, path_sta
 }
 
 // The light of the path's present event, on a surface or in a cloud: what shines there, what one light brings, and where the path goes on.
-STAGE(SCATTER) {
-    PATH_STAGE_BEGINS(s, w);
-    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
+CALLED void packet_scatters(stage s, const packet_pixels *at, world w) {
     const camera_sample a = camera_sample_kept(s);
-    interaction found = interaction_kept(s, bounce);
+    interaction found = interaction_kept(s, s.bounce);
     path so_far;
-    const ray from_eye = eye_ray(&a, view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
+    const ray from_eye = eye_ray(&a, w.view), arrived = path_ray(s, from_eye, a.wanted, &so_far);
     path_state with;
     const halt stop = path_carries(s, &so_far, &with, arrived.origin, w);
     const mask by_glass = equal(stop.halted, HALTED_BY_GLASS), in_cloud = equal(stop.halted, HALTED_BY_CLOUD);
@@ -30,7 +29,7 @@ STAGE(SCATTER) {
     const color white = color_of(R(1.0), R(1.0), R(1.0)), black = color_of(R(0.0), R(0.0), R(0.0));
     with.awaited = black;
     so_far.on_path = number_of(scatters);
-    const mask emerges = path_comes_out(bounce, &with, &found, arrived.direction, lands, w), none = lands & ~lands;
+    const mask emerges = path_comes_out(s.bounce, &with, &found, arrived.direction, lands, w), none = lands & ~lands;
     ray shadow_ray = {found.point, arrived.direction, R(0.0), R(-1.0), found.cone, R(0.0), RAY_NOTHING_KNOWN};
     vec outward = found.normal, shading = outward;
     color reflects = white, weights = white;
@@ -41,7 +40,7 @@ STAGE(SCATTER) {
     if (any_lane(lands)) {
         p = pbr_of_interaction(s, &found, w);
         if (HAS(w, GLASS)) {
-            path_square(s, &here.at, PURPOSE_WAVE, w, &in_spectrum, &unused);
+            path_square(s, at, PURPOSE_WAVE, w, &in_spectrum, &unused);
             edge = border_at(&with, &found, lands, w);
             weights = glass_met(&with, edge, &p, &in_spectrum, w);
             outward = vec_pick(edge.leaving, vec_scale(outward, R(-1.0)), outward);
@@ -60,20 +59,20 @@ STAGE(SCATTER) {
         e.medium = (medium_event){arrived.direction, stop.anisotropy};
         so_far.origin = vec_pick(scatters, e.from, so_far.origin);
         with.total = weight_of_all(e.from, e.own, w);
-        const light_ray light = path_samples_light(s, &here.at, &e, with.total, w, &with.awaited);
+        const light_ray light = path_samples_light(s, at, &e, with.total, w, &with.awaited);
         with.awaited = color_mul(with.awaited, so_far.through);
-        if (bounce > 0 && !HAS(w, CLOUDS)) with.awaited = limited(with.awaited, w.settings);
+        if (s.bounce > 0 && !HAS(w, CLOUDS)) with.awaited = limited(with.awaited, w.settings);
         shadow_ray.origin = e.from;
         shadow_ray.direction = light.toward;
         shadow_ray.far = pick(scatters & ~edge.hidden, light.distance, R(-1.0));
         shadow_ray.footprint = pick(in_cloud, so_far.footprint, found.cone) * (real)(w.settings->shadow_detail);
         if (HAS(w, GLASS)) awaited_absorbed(&with, edge, light.distance, w);
-        path_leaves(s, &here.at, &so_far, &with, &e, &found, edge, &p, weights, in_spectrum, lands, w);
+        path_leaves(s, at, &so_far, &with, &e, &found, edge, &p, weights, in_spectrum, lands, w);
         path_widens(s, &so_far, &found, from_eye, a.time, lands, w);
     }
     if (KEEPS(s, STATE_FLIGHT)) {
-        path_sets_out(s, &here.at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, scatters, w);
-        walk_seeded(s, &here.at, &with, lands, w);
+        path_sets_out(s, at, &so_far, &with, PURPOSE_FLIGHT + NEXT_BOUNCE, scatters, w);
+        walk_seeded(s, at, &with, lands, w);
     }
     if (KEEPS(s, STATE_HALT)) {
         const halt over = {R(0.0), R(0.0), shadow_ray.far};
@@ -81,11 +80,13 @@ STAGE(SCATTER) {
         so_far.on_path += left_alone;
     }
     if (KEEPS(s, STATE_AOVS)) {
-        if (bounce == 0) aovs_begin(s, lands, reflects, so_far.seen, shading);
-        if (bounce == 1) aovs_once(s, so_far.seen);
+        if (s.bounce == 0) aovs_begin(s, lands, reflects, so_far.seen, shading);
+        if (s.bounce == 1) aovs_once(s, so_far.seen);
     }
     with.awaited = color_pick(scatters, with.awaited, black);
     STATE_KEEP(s, so_far, STATE_PATH);
     path_state_keep(s, &with);
     send_clipped(s, 0, shadow_ray, R(0.0), WHETHER, scatters & less(R(0.0), shadow_ray.far), w);
 }
+
+STAGE(SCATTER) { FOR_PATHS(packet_scatters); }

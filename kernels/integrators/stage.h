@@ -44,6 +44,13 @@ INLINE stage stage_of(int item, int row, pass span, queue q, __global scalar *st
     const int slot = (row * (span.end_packet - span.first_packet) + item) * LANES;
     return (stage){span, q, state + slot, at, q.wave + STATE_PADDING, item + span.first_packet, first_tile + row, slot, bounce, sample};
 }
+// The same of the packet that is `count` further in the tile.
+INLINE stage stage_moved(stage s, int count) {
+    s.state += count * LANES;
+    s.packet += count;
+    s.slot += count * LANES;
+    return s;
+}
 #define STAGE_OF(name)                                                                                                     \
     const pass span_ = PASS;                                                                                               \
     const queue queue_ = STAGE_QUEUE;                                                                                      \

@@ -19,8 +19,10 @@ typedef char structs_are_small[FEW(camera_sample) && FEW(interaction) && FEW(pat
 
 // Where the first number of one of the parts is, and of the one that is number `i` among several.
 INLINE __global scalar *state_part(stage s, int part) { return s.state + s.at[part] * s.stride; }
-#define STATE_KEEP(s, thing, part) KEEP(thing, state_part(s, part), (s).stride)
-#define STATE_RECALL(s, thing, part) RECALL(thing, state_part(s, part), (s).stride)
+#define STATE_KEEP_NUMBERS(s, thing, count, to) KEEP_NUMBERS_AT(thing, count, to, (s).stride, (s).q.lanes)
+#define STATE_RECALL_NUMBERS(s, thing, count, from) RECALL_NUMBERS_AT(thing, count, from, (s).stride, (s).q.lanes)
+#define STATE_KEEP(s, thing, part) STATE_KEEP_NUMBERS(s, (const real *)&(thing), NUMBERS_OF(thing), state_part(s, part))
+#define STATE_RECALL(s, thing, part) STATE_RECALL_NUMBERS(s, (real *)&(thing), NUMBERS_OF(thing), state_part(s, part))
 #define STATE_KEPT(s, type, thing, part) type thing; STATE_RECALL(s, thing, part)
 #define STATE_KEEP_ONE(s, thing, part, i) KEEP(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
 #define STATE_RECALL_ONE(s, thing, part, i) RECALL(thing, state_part(s, part) + (i) * NUMBERS_OF(thing) * (s).stride, (s).stride)
@@ -35,9 +37,9 @@ INLINE __global scalar *surface_beside_at(stage s, int place, world w) { return 
 // Things of slices, of which `i` may be kept one after the other: TYPE_keep_one, TYPE_kept_one. Slices that the scene does not need are
 // not kept, and as in `nothing`.
 #define KEEP_SLICE(SLICE)                                                                                                   \
-    KEEP_NUMBERS((const real *)thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride, s.stride);
+    STATE_KEEP_NUMBERS(s, (const real *)thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride);
 #define RECALL_SLICE(SLICE)                                                                                                 \
-    RECALL_NUMBERS((real *)&thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride, s.stride);
+    STATE_RECALL_NUMBERS(s, (real *)&thing + SLICE##_FIRST, SLICE##_NUMBERS, state_part(s, STATE_##SLICE) + i * SLICE##_NUMBERS * s.stride);
 #define KEEP_SLICE_NEEDED(SLICE) if (KEEPS(s, STATE_##SLICE)) KEEP_SLICE(SLICE)
 #define RECALL_SLICE_NEEDED(SLICE) if (KEEPS(s, STATE_##SLICE)) RECALL_SLICE(SLICE)
 #define OF_SLICES(type, SLICES, nothing)                                                                                    \

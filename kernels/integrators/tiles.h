@@ -43,6 +43,24 @@ INLINE packet_pixels packet_at(int packet, int2 corner, view_record view) {
     return p;
 }
 
+// Any pixels of a tile, by their numbers on the curve, of which all are to be rendered.
+INLINE packet_pixels pixels_at(const int *numbers, int2 corner) {
+    packet_pixels p;
+    scalar x[LANES], y[LANES];
+    for (int lane = 0; lane < LANES; ++lane) {
+        const int column = morton_column(numbers[lane]), row = morton_column(numbers[lane] >> 1);
+        p.place[lane] = row * TILE + column;
+        p.columns[lane] = corner.x + column;
+        p.rows[lane] = corner.y + row;
+        x[lane] = (scalar)p.columns[lane] + S(0.5);
+        y[lane] = (scalar)p.rows[lane] + S(0.5);
+    }
+    p.x = lanes_load(x);
+    p.y = lanes_load(y);
+    p.in_region = less(R(0.0), R(1.0));
+    return p;
+}
+
 // `slot`: the channel's place among the wanted ones, or -1; `framebuffer` begins at the tile.
 INLINE void write_channel(__global float *framebuffer, int slot, const int *place, real value) {
     if (slot < 0) return;

@@ -51,6 +51,7 @@ typedef struct {
     int numbers;       // that are kept of what a ray met
     int objects;       // whether rays meet objects beside the set, too
     int known;         // whether something is known of rays
+    lane_places lanes; // where the packet's pixels stand
 } queue;
 
 // Sends one ray of each pixel of a packet, whose first pixel is number `first` of the wave. Those that are not wanted have no
@@ -58,8 +59,8 @@ typedef struct {
 INLINE void queue_send(queue q, int turn, int first, ray r, mask wanted) {
     r.far = pick(wanted, r.far, R(-1.0));
     __global scalar *at = q.rays + turn * q.wave + first;
-    KEEP_NUMBERS((const real *)&r, RAY_SENT, at, q.stride);
-    if (q.known) lanes_store(r.known, at + RAY_KNOWN * q.stride);
+    KEEP_NUMBERS_AT((const real *)&r, RAY_SENT, at, q.stride, q.lanes);
+    if (q.known) lanes_store_at(r.known, at + RAY_KNOWN * q.stride, &q.lanes);
 }
 
 // Sends none for any pixel of a packet.
@@ -76,8 +77,8 @@ INLINE ray queue_ray(queue q, int turn, int first) {
     ray r;
     r.known = RAY_NOTHING_KNOWN;
     __global const scalar *at = q.rays + turn * q.wave + first;
-    RECALL_NUMBERS((real *)&r, RAY_SENT, at, q.stride);
-    if (q.known) r.known = lanes_load(at + RAY_KNOWN * q.stride);
+    RECALL_NUMBERS_AT((real *)&r, RAY_SENT, at, q.stride, q.lanes);
+    if (q.known) r.known = lanes_load_at(at + RAY_KNOWN * q.stride, &q.lanes);
     return r;
 }
 
