@@ -8,14 +8,12 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
 from clfractal.formulas.products import Value
 
-_PRODUCT = re.compile(
-    r"^[^\S\n]*const (?:real|dual) (\w+) = (?:real|dual)_mul(?:_real)?\([^;\n]*;\n", re.MULTILINE
-)
+_STATEMENT = re.compile(r"^[^\S\n]*const (?:complex_)?(?:real|dual) (\w+) = [^;\n]*;\n", re.MULTILINE)
 _WORD = re.compile(r"\b[A-Za-z_]\w*\b")
 
 
@@ -24,15 +22,20 @@ def _unless(names: set[str], statement: re.Match[str]) -> str:
 
 
 def without_unused(body: str) -> str:
-    """The statements of one function without products that nothing uses but sums that took them."""
+    """The statements of one function without those that nothing uses: products that sums took, slopes that cancelled."""
     while True:
         uses = Counter(_WORD.findall(body))
         # A statement may be there twice: in a loop, and behind it.
-        written = Counter(_PRODUCT.findall(body))
+        written = Counter(_STATEMENT.findall(body))
         unused = {name for name, times in written.items() if uses[name] == times}
         if not unused:
             return body
-        body = _PRODUCT.sub(partial(_unless, unused), body)
+        body = _STATEMENT.sub(partial(_unless, unused), body)
+
+
+def needed(lines: Sequence[str], results: Sequence[str]) -> list[str]:
+    """Statements, and what they are for, without those that nothing uses."""
+    return without_unused("".join(f"{line}\n" for line in [*lines, *results])).splitlines()
 
 
 def fused(

@@ -17,9 +17,9 @@ from clfractal.formulas.costs import OPERATIONS, WORTH_CARRYING, cost_of, count_
 from clfractal.formulas.emit import Constants, Emitter, NumberType
 from clfractal.formulas.evaluate import as_function, evaluate_constant, finite
 from clfractal.formulas.functions import Facts, each_usual, state_functions
-from clfractal.formulas.fuse import fused, without_unused
+from clfractal.formulas.fuse import fused, needed, without_unused
+from clfractal.formulas.jacobian import LocalJacobian, local_jacobian
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
-from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.products import Value, literal
 from clfractal.formulas.turns import Span
 from clfractal.records import dataclass, field
@@ -269,19 +269,13 @@ class _ChainWriter:
         )
 
     def _add_constant(
-        self,
-        index: int,
-        number_type: NumberType,
-        emitter: Emitter,
-        mapped: list[Value],
-        local: tuple[Emitter, list[Value]] | None = None,
+        self, index: int, number_type: NumberType, emitter: Emitter, mapped: list[Value]
     ) -> list[str]:
-        """The components after adding C; `local`: a map written by its Jacobian, of which they are the values."""
+        """The components after adding C."""
         bound = self.links[index].bound
         texts: list[str] = []
-        writer, values = local or (emitter, mapped)
         for i, value in enumerate(mapped):
-            added = Value(f"c.s{i}{'.v' if local else ''}", "varying")
+            added = Value(f"c.s{i}", "varying")
             if bound.add == "none":
                 texts.append(self._full(number_type, value))
             elif bound.add == "constant":
@@ -294,8 +288,8 @@ class _ChainWriter:
             else:
                 texts.append(f"{number_type}_add({self._full(number_type, value)}, c.s{i})")
             # The product of a last operation joins what is added, as it does within the map.
-            call = fused("add", (values[i], added), writer.origins, writer.plain)
-            if call is not None and bound.add != "none" and (local or bound.add != "constant"):
+            call = fused("add", (value, added), emitter.origins, emitter.plain)
+            if call is not None and bound.add == "point":
                 text = f"{call[0]}({', '.join(call[1:])})"
                 texts[i] = text if number_type == "real" else f"dual_with({texts[i]}, {text})"
         return texts
@@ -307,18 +301,17 @@ class _ChainWriter:
         mapped = self._map(emitter, bound)
         local = None
         if number_type == "dual" and not bound.formula.point_map and self.dual_map != "operations":
-            writer, values, rows = self._by_local_jacobian(index, usual=usual)
-            cost = cost_of(_needed(writer.lines, [f" = {row};" for row in rows]))
-            usually = cost_of(_needed(emitter.lines, [value.text for value in mapped]))
-            if self.dual_map == "jacobian" or cost < usually:
-                local, emitter, mapped = (writer, values), writer, [Value(row, "varying") for row in rows]
+            usually = cost_of(needed(emitter.lines, [value.text for value in mapped]))
+            jacobian = self._by_local_jacobian(index, usual=usual)
+            if self.dual_map == "jacobian" or jacobian.cost() < usually:
+                local, emitter = jacobian, jacobian.emitter
         name = self.name + _name(number_type, index, usual)
         head = f"INLINE {state} {name}({state} z, {state} c, __constant const scalar *k) {{"
         # All passes but the last one, whose map is written once more: what is added joins its last operations.
         passes = []
         times = self._times(index, usual=usual)
         if times != "1":
-            inner = ", ".join(self._full(number_type, value) for value in mapped)
+            inner = ", ".join(local.rows() if local else (self._full(number_type, value) for value in mapped))
             passes = [
                 f"for (int pass = 1; pass < {times}; ++pass) {{",
                 *("    " + line for line in emitter.lines),
@@ -326,13 +319,14 @@ class _ChainWriter:
                 "    z = next;",
                 "}",
             ]
-        # A map written by its Jacobian is made of real statements; what is added to it is not.
-        adder = emitter
-        if emitter.number_type != number_type:
-            adder = Emitter(number_type, {}, self.constants, index, prefix="u")
-        texts = self._add_constant(index, number_type, adder, mapped, local)
-        lines = passes + (emitter.lines if adder is emitter else [*emitter.lines, *adder.lines])
-        return _function(head, lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;")
+        texts = (
+            self._add_to_jacobian(index, local)
+            if local
+            else self._add_constant(index, number_type, emitter, mapped)
+        )
+        return _function(
+            head, passes + emitter.lines, f"const {state} next = {{{', '.join(texts)}}};\n    return next;"
+        )
 
     def _times(self, index: int, *, usual: bool) -> str:
         """How often a link's map is applied before something is added, as C text."""
@@ -342,28 +336,35 @@ class _ChainWriter:
             return str(round(evaluate_constant(formula.repeat, formula.shaping)))
         return f"(int)k[{self.constants.slot((index, 'repeat', 0))}]"
 
-    def _by_local_jacobian(self, index: int, *, usual: bool) -> tuple[Emitter, list[Value], list[str]]:
-        """The map over dual numbers by its own Jacobian: real statements, their values, and a dual expression of each."""
+    def _by_local_jacobian(self, index: int, *, usual: bool) -> LocalJacobian:
         emitter = self._emitter(index, "real", usual=usual)
         emitter.bindings = {
             name: Value(f"{value.text}.v", value.kind) if value.text.startswith(("z.", "c.")) else value
             for name, value in emitter.bindings.items()
         }
-        mapped = self._map(emitter, self.links[index].bound)
-        differentiator = Differentiator(emitter)
-        rows = []
-        for value in mapped:
-            terms = []
-            for j in range(self.size):
-                partial = differentiator.partial(value, j)
-                if partial is not None:
-                    terms += [partial.text, f"z.s{j}"]
-            count = len(terms) // 2
-            chain = "dual_chain" if count == 1 else f"dual_chain{count}"
-            rows.append(
-                f"{chain}({', '.join([value.text, *terms])})" if terms else f"dual_constant({value.text})"
-            )
-        return emitter, mapped, rows
+        return local_jacobian(emitter, self._map(emitter, self.links[index].bound), self.size)
+
+    def _add_to_jacobian(self, index: int, local: LocalJacobian) -> list[str]:
+        """The components after adding C of a map that is written by its Jacobian."""
+        bound = self.links[index].bound
+        if bound.add == "none":
+            return local.rows()
+        texts = []
+        for i, value in enumerate(local.mapped):
+            added = Value(f"c.s{i}.v", "varying")
+            if bound.add == "constant":
+                added = Value(self.constants.text((index, "julia", i)), "flat")
+            # The product of a last operation joins what is added, as it does within the map.
+            call = fused("add", (value, added), local.emitter.origins, local.emitter.plain)
+            function, *operands = call or ("real_add", value.text, added.text)
+            text = f"{function}({', '.join(operands)})"
+            if bound.add == "constant":
+                texts.append(local.row(i, text))
+            elif i < 3:
+                texts.append(local.row(i, text, "xyz"[i]))
+            else:
+                texts.append(f"dual_with(dual_add({local.row(i, value.text)}, c.s{i}), {text})")
+        return texts
 
     def _apply_derivative(self, index: int, *, usual: bool) -> str:
         """One application that carries the scalar derivative along, sharing what the two have in common."""
@@ -482,11 +483,6 @@ def _turn(spans: Sequence[Span]) -> list[str]:
         lines.append(f"    turn = (n + {span.offset}) % {span.cycle};")
         lines += [f"    if (turn >= {first}) turn += {count};" for first, count in span.skipped]
     return [*lines, "}"]
-
-
-def _needed(lines: Sequence[str], results: Sequence[str]) -> list[str]:
-    """Statements, and what they are for, without those that nothing uses."""
-    return without_unused("".join(f"{line}\n" for line in [*lines, *results])).splitlines()
 
 
 def _function(head: str, lines: Sequence[str], tail: str | None) -> str:

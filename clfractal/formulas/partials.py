@@ -122,29 +122,62 @@ class Differentiator:
         if partial is None or factor.number == 0:
             return None
         if factor.number == -1:
-            return self.emitter.combine("neg", partial)
+            return self._opposite(partial) or self.emitter.combine("neg", partial)
+        if self.emitter.origins.get(partial.text) == ("sign", (factor,)):
+            return self.emitter.combine("abs", factor)
+        # Numbers in both may cancel, as in -w^3/2 by 2y.
+        (one, bare), (other, rest) = self._factored(factor), self._factored(partial)
+        if one * other == 1:
+            return self.emitter.combine("mul", bare, rest)
+        if one * other == -1:
+            return self.emitter.combine("neg", self.emitter.combine("mul", bare, rest))
         return self.emitter.combine("mul", factor, partial)
 
     def _sum(self, a: Partial, b: Partial) -> Partial:
         if a is None or b is None:
             return a if b is None else b
+        for one, other in ((b, a), (a, b)):
+            opposite = self._opposite(one)
+            if opposite is not None:
+                return self.emitter.combine("sub", other, opposite)
         return self.emitter.combine("add", a, b)
 
     def _choose(self, mask: str, yes: Partial, no: Partial) -> Partial:
         if yes is None and no is None:
             return None
+        opposite = self._opposite(yes) if yes is not None and no is None else None
+        if opposite is not None:
+            return self.emitter.combine("neg", self.emitter.choose(mask, opposite, literal(0.0)))
         return self.emitter.choose(mask, yes or literal(0.0), no or literal(0.0))
+
+    def _opposite(self, value: Value) -> Partial:
+        """x for a value that was computed as -x, else None."""
+        function, operands = self.emitter.origins.get(value.text, ("", ()))
+        return operands[0] if function == "neg" else None
+
+    def _factored(self, value: Value) -> tuple[float, Value]:
+        """A number, and what it multiplies."""
+        if value.number is not None:
+            return value.number, _ONE
+        function, operands = self.emitter.origins.get(value.text, ("", ()))
+        if function == "neg":
+            number, bare = self._factored(operands[0])
+            return -number, bare
+        for of, rest in (operands, operands[::-1]) if function == "mul" else ():
+            if of.number is not None:
+                return of.number, rest
+        return 1.0, value
 
 
 # The derivatives of functions of one number, by what it is and what the function gives.
 _SLOPES: Mapping[str, Callable[[Emitter, Value, Value], Value]] = {
     "neg": lambda emit, a, value: literal(-1.0),
     "abs": lambda emit, a, value: emit.combine("sign", a),
-    "sqrt": lambda emit, a, value: emit.choose_above(
-        "R(0.0)", a, emit.combine("mul", emit.combine("rsqrt", a), _HALF)
+    "sqrt": lambda emit, a, value: emit.combine(
+        "mul", emit.choose_above("R(0.0)", a, emit.combine("rsqrt", a)), _HALF
     ),
     "rsqrt": lambda emit, a, value: emit.combine(
-        "mul", emit.combine("mul", value, literal(-0.5)), emit.combine("mul", value, value)
+        "mul", emit.combine("mul", value, emit.combine("mul", value, value)), literal(-0.5)
     ),
     "exp": lambda emit, a, value: value,
     "log": lambda emit, a, value: emit.choose_above("(real)(LOG_SMALLEST)", a, emit.combine("div", _ONE, a)),

@@ -320,19 +320,22 @@ def table(precision: str) -> list[Operation]:
             slopes=lambda a, b, c: (0, b, c),
         ),
         Operation(
-            "chain3",
+            "more",
             3,
             lambda a, b, c: a,
-            duals=("dual_chain3(a, a, A, b, B, c, C)",),
+            duals=("dual_more(dual_more(dual_chain(a, c, C), b, B), a, A)",),
             slopes=lambda a, b, c: (a, b, c),
         ),
-        Operation(
-            "chain4",
-            3,
-            lambda a, b, c: a,
-            duals=("dual_chain4(a, a, A, b, B, c, C, R(2.0), B)",),
-            slopes=lambda a, b, c: (a, mpf(b) + 2, c),
-            slope_ulps=lambda a, b, c: 1 + 2 / max(abs(b + 2), 1e-3),
+        *(
+            Operation(
+                f"chain_{axis}",
+                3,
+                lambda a, b, c: a,
+                duals=(f"dual_chain_{axis}(a, b, C)",),
+                slopes=lambda a, b, c: (0, 0, b),
+                added=_axis(axis),
+            )
+            for axis in "xyz"
         ),
         *(
             Operation(

@@ -14,14 +14,12 @@ INLINE dual dual_chain2(real v, real fa, dual a, real fb, dual b) {
     return (dual){v, fa * a.dx + fb * b.dx, fa * a.dy + fb * b.dy, fa * a.dz + fb * b.dz};
 }
 
-// The chain rule for functions of three and four numbers: a row of a map's Jacobian times the J carried along.
-INLINE dual dual_chain3(real v, real fa, dual a, real fb, dual b, real fc, dual c) {
-    return (dual){v, fa * a.dx + fb * b.dx + fc * c.dx, fa * a.dy + fb * b.dy + fc * c.dy, fa * a.dz + fb * b.dz + fc * c.dz};
-}
-INLINE dual dual_chain4(real v, real fa, dual a, real fb, dual b, real fc, dual c, real fd, dual d) {
-    return (dual){v, fa * a.dx + fb * b.dx + fc * c.dx + fd * d.dx, fa * a.dy + fb * b.dy + fc * c.dy + fd * d.dy,
-                    fa * a.dz + fb * b.dz + fc * c.dz + fd * d.dz};
-}
+// One more product of the chain rule, which is added: rows of a map's Jacobian times the J carried along are made of these. A row begins
+// with that of the last number, and with a coordinate of the point that is added to the value: it has the partials 1, 0, 0 and so on.
+INLINE dual dual_more(dual sum, real fa, dual a) { return (dual){sum.v, fa * a.dx + sum.dx, fa * a.dy + sum.dy, fa * a.dz + sum.dz}; }
+INLINE dual dual_chain_x(real v, real slope, dual a) { return (dual){v, slope * a.dx + R(1.0), slope * a.dy, slope * a.dz}; }
+INLINE dual dual_chain_y(real v, real slope, dual a) { return (dual){v, slope * a.dx, slope * a.dy + R(1.0), slope * a.dz}; }
+INLINE dual dual_chain_z(real v, real slope, dual a) { return (dual){v, slope * a.dx, slope * a.dy, slope * a.dz + R(1.0)}; }
 
 // The same partials with another value: of a product and a sum that are rounded once.
 INLINE dual dual_with(dual a, real v) { return (dual){v, a.dx, a.dy, a.dz}; }
