@@ -36,15 +36,15 @@ renderer: {type: surface, samples: 65536, detail: 0.01, max_steps: 100000}
 HOLD = """
 import os, sys, time
 from clfractal.images.store import JournalFramebuffer
-put, most, stored = JournalFramebuffer.put, int(sys.argv.pop(1)), []
+put, most, stored = JournalFramebuffer.put_tiles, int(sys.argv.pop(1)), []
 
-def held(*arguments, **named):
-    put(*arguments, **named)
-    stored.append(arguments)
+def held(framebuffer, indices, *arguments):
+    put(framebuffer, indices, *arguments)
+    stored.extend(indices)
     while len(stored) >= most and not os.path.exists("go"):
         time.sleep(0.005)
 
-JournalFramebuffer.put = held
+JournalFramebuffer.put_tiles = held
 sys.argv[0] = "clfractal"
 """
 MAIN = "from clfractal.cli import main\nmain()\n"
