@@ -72,6 +72,11 @@ class Drafts:
         """A scene as it is rendered."""
         return draft(scene) if moving and self._of_others.coarsest > 1 else scene
 
+    def moving(self, scene: Scene, job: Job, prepared: Callable[[Scene], Job]) -> Job:
+        """What is rendered while the camera of a scene moves whose picture is rendered by `job`."""
+        shaded = self.shaded(scene, True)
+        return job if shaded is scene else prepared(sharp(shaded))
+
     def pacing(self, drafted: bool) -> Pacing:
         """How coarse drafts are, or others: a draft takes a part of the time."""
         self._own.rate, self._own.coarsest = self._of_others.rate, self._of_others.coarsest

@@ -456,27 +456,21 @@ class Session:
         grown = partial(self._grown, work, canvas)
         state = self._painter.run(part, canvas, token, numbers=work.numbers, samples=samples, grown=grown)
         work.ranges.pop(0)
-        seconds = state.seconds
-        work.seconds += seconds
+        work.seconds += state.seconds
         work.samples, work.prepared = samples[1], True
         if samples[0] == 0:
-            carry = self._painter.foreseen(partial(self._moving, work))
-            draft = self._drafts.foreseen(work.wanted.scene, self._prepared)
+            scene = work.wanted.scene
+            moving = partial(self._drafts.moving, scene, work.job, self._prepared)
+            carry, draft = self._painter.foreseen(moving), self._drafts.foreseen(scene, self._prepared)
             for foreseen in (carry, draft):
                 if foreseen is not None:
                     self.add(foreseen)
         if samples[1] == 1:
             pixels = sum(view.plan.region.pixels for view in part.views)
-            self.pacing.learn(pixels, 1e-3 * state.kernel_ms, seconds)
+            self.pacing.learn(pixels, 1e-3 * state.kernel_ms, state.seconds)
         if not work.ranges or samples[0] == 0 or work.schedule.due(time.perf_counter()):
             last = not work.ranges and not work.cleans
-            self._publish(work.wanted, work.job, canvas, work.growth(seconds, finished=last))
-
-    def _moving(self, work: Gathering) -> Job:
-        """What is rendered while the camera of a picture moves."""
-        scene = work.wanted.scene
-        shaded = self._drafts.shaded(scene, True)
-        return work.job if shaded is scene else self._prepared(sharp(shaded))
+            self._publish(work.wanted, work.job, canvas, work.growth(state.seconds, finished=last))
 
     def _grown(self, work: Gathering, canvas: Canvas, state: Progress) -> None:
         """Shows a picture whose pass is under way."""
