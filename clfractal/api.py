@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias, cast
 
@@ -10,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import FormulaError, Where, arguments
-from clfractal.records import dataclass
 from clfractal.scene.load import as_scene
 from clfractal.scene.load import load_scene as load_scene
 from clfractal.scene.model import Scene

@@ -5,12 +5,11 @@ Space is right-handed, z up, in scene units. The plane faces the viewer; an eye 
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.records import dataclass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene

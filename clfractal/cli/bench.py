@@ -10,7 +10,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,7 +29,6 @@ from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.formulas.opencl import operations_per_application
 from clfractal.integrators.lanes import march_reports
 from clfractal.integrators.volume import settings_of
-from clfractal.records import dataclass
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.voxels.fill import fill_grid

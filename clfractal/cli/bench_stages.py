@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import statistics
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,6 @@ from clfractal.engine.prepare import prepare
 from clfractal.engine.run import Progress
 from clfractal.engine.run import run as do
 from clfractal.formulas.opencl import operations_per_application
-from clfractal.records import dataclass
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from clfractal.cli.shell import Shell
@@ -11,7 +12,6 @@ from clfractal.device.select import Device, DeviceInfo
 from clfractal.errors import ClfractalError, DeviceError
 from clfractal.integrators import lanes
 from clfractal.integrators.trial import RULES
-from clfractal.records import dataclass
 
 _HEAD = ("", "index", "name", "platform", "memory", "float64", "GL", "lanes", "speed")
 

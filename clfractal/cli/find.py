@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,7 +26,6 @@ from clfractal.engine.variations import small_scene
 from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.records import dataclass
 from clfractal.scene.bookmarks import MAX_BOOKMARKS
 from clfractal.scene.load import load_scene
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,7 +14,6 @@ from clfractal.cli.unfinished import Unfinished, continued
 from clfractal.engine.finish import save_job
 from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.run import run
-from clfractal.records import dataclass
 
 if TYPE_CHECKING:
     from clfractal.cli.shell import Shell

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from clfractal.errors import SceneError, Where
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ import re
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import BinaryIO
@@ -20,7 +21,6 @@ from clfractal.errors import FileError, Where
 from clfractal.files.atomic import naming
 from clfractal.files.file_kinds import kind_of_start
 from clfractal.files.regular import MAX_BYTES
-from clfractal.records import dataclass
 
 INPUT = "standard input"
 STREAM = "-"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -14,7 +15,6 @@ from clfractal.errors import FileError, SceneError, Where
 from clfractal.files.atomic import atomic_writer, check_output, naming
 from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.named_files import rename_files
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +17,6 @@ from clfractal.cli.shell import Shell
 from clfractal.errors import SceneError, Where
 from clfractal.files.frame_names import PARTIAL
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.records import dataclass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.rectangle import moved

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,7 +14,6 @@ from clfractal.device.activity import doing
 from clfractal.errors import SceneError, Where
 from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.files.inputs import refuse_overwriting
-from clfractal.records import dataclass
 from clfractal.scene.animation import MAX_FRAMES
 
 if TYPE_CHECKING:

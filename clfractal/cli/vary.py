@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
@@ -25,7 +25,6 @@ from clfractal.engine.variations import (
 )
 from clfractal.engine.varied import Kind, Strength
 from clfractal.errors import SceneError, Where, speaking_of, unknown_name
-from clfractal.records import dataclass
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 

@@ -7,7 +7,7 @@ import re
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,7 +21,6 @@ from clfractal.files import memory
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.volume_file import BESIDE, EXTENSIONS, write_volume
-from clfractal.records import dataclass
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.load import load_coloring, load_scene, read_scene
 from clfractal.scene.model import Scene

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Future
 from concurrent.futures import TimeoutError as NotYet
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Self
 from uuid import uuid4
@@ -29,7 +29,6 @@ from clfractal.engine.job import Job
 from clfractal.engine.run import Result, WorkItem
 from clfractal.errors import ClfractalError, DeviceError, arguments
 from clfractal.images.tiles import TileGrid
-from clfractal.records import dataclass
 
 if TYPE_CHECKING:
     from clfractal.cluster.cluster_engine import ClusterEngine

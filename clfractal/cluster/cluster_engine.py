@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Mapping
 from concurrent.futures import Future
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,7 +19,6 @@ from clfractal.engine.run import Executor
 from clfractal.errors import ClfractalError
 from clfractal.integrators.lanes import rule_of
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye

@@ -11,6 +11,7 @@ import time
 from collections import Counter, deque
 from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import Any
 from uuid import uuid4
 
@@ -21,7 +22,6 @@ from clfractal.engine.job import Job
 from clfractal.engine.run import WorkItem
 from clfractal.errors import STATUS_DEVICE_FAILED, ClfractalError, DeviceError, KernelBuildError
 from clfractal.images.tiles import TILE
-from clfractal.records import dataclass, field
 
 RETURN_SECONDS = 60.0
 """How long a scheduler may be gone, or be without workers, before a render ends."""

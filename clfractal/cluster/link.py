@@ -10,13 +10,13 @@ import time
 from collections import Counter
 from collections.abc import Awaitable, Callable, Mapping, Sequence
 from contextlib import suppress
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, TypeVar
 from uuid import uuid4
 
 from clfractal.cluster.fingerprint import fingerprint
 from clfractal.device.select import DeviceInfo, has_float64
 from clfractal.files import resources
-from clfractal.records import dataclass, field
 
 if TYPE_CHECKING:
     from clfractal.cluster.tasks import Seat

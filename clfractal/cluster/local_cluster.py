@@ -6,11 +6,11 @@ import re
 import ssl
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from clfractal.errors import DeviceError, FileError, SceneError, Where
-from clfractal.records import dataclass
 
 _MOST_LOCAL = 256
 _LEAST_PORT = 1023

@@ -7,13 +7,12 @@ import io
 import pickle
 from collections import OrderedDict
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path, PurePath
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-from clfractal.records import dataclass, field
 
 Array = npt.NDArray[Any]
 Arrays = Mapping[str, Array]

@@ -12,7 +12,7 @@ import time
 from collections import OrderedDict
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import numpy as np
@@ -30,7 +30,6 @@ from clfractal.engine.run import Counters, Floats, Tiles, WorkItem
 from clfractal.errors import ClfractalError, Stopped, Where
 from clfractal.files import resources
 from clfractal.images.provenance import RenderDevice
-from clfractal.records import dataclass
 
 if TYPE_CHECKING:
     from clfractal.engine.engine import Engine

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from clfractal.device.source import SourceMap, origin
 from clfractal.errors import STATUS_BAD_INPUT, STATUS_DEVICE_FAILED, KernelBuildError, Where
-from clfractal.records import dataclass
 
 # Clang's form is used by PoCL (which puts `error: ` first), Intel, AMD, Apple, Mesa and Oclgrind; NVIDIA
 # writes `<kernel>:3:5: error: ...` in the same form; the older EDG front ends write `"file", line 3: error:

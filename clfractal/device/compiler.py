@@ -10,6 +10,7 @@ import contextlib
 import os
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
@@ -20,7 +21,6 @@ from clfractal.device import driver_files, drivers_folder
 from clfractal.device.groups import fitting
 from clfractal.device.select import Device, by_key, is_pocl
 from clfractal.errors import DeviceError
-from clfractal.records import dataclass
 
 BINARY = "binary"  # the file that `compile_job` leaves
 

@@ -16,6 +16,7 @@ import os
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
 
@@ -24,7 +25,6 @@ import pyopencl as cl
 from clfractal.device.driver_errors import status_name
 from clfractal.device.select import Device, Properties
 from clfractal.errors import DeviceError
-from clfractal.records import dataclass
 
 FENCES = "cl_khr_gl_event"
 

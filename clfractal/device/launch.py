@@ -6,6 +6,7 @@ import time
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing, suppress
+from dataclasses import dataclass
 from typing import Generic, TypeVar
 
 import numpy as np
@@ -17,7 +18,6 @@ from clfractal.device.groups import fitting
 from clfractal.device.select import Device
 from clfractal.device.watched import Watched
 from clfractal.errors import ClfractalError, DeviceError
-from clfractal.records import dataclass
 
 # Time that the work under way on a device should take, unless a caller gives another.
 BUDGET_SECONDS = 0.1

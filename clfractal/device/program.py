@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,6 @@ from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
 from clfractal.errors import FileError, NotReady, Stopped, Where
 from clfractal.files import system
-from clfractal.records import dataclass
 
 BUILD_TIMEOUT_S = 600.0
 LEAST_FILE_SIZE = 4 << 20

@@ -11,7 +11,7 @@ import re
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cache as cache_of_calls
 from functools import cached_property
 from typing import Any, Literal
@@ -34,7 +34,6 @@ from clfractal.errors import (
     unknown_name,
 )
 from clfractal.errors.arguments import plain, shown
-from clfractal.records import dataclass
 
 # pyopencl's own cache holds only how arguments are passed. It lies in the home folder, where one may not be able to
 # write, and reading it takes longer than making its contents anew (15 ms of a start, instead of 10).

@@ -10,12 +10,12 @@ import os
 import posixpath
 import re
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
 
 from clfractal.errors import KernelBuildError, Where, nearest
 from clfractal.files.resources import folder
-from clfractal.records import dataclass, field
 
 # (A search for a first letter is ten times as fast as one for the beginning of a line.)
 _DIRECTIVE = re.compile(r'#[ \t]*(?:(?P<include>include)[ \t]*(?:"(?P<name>[^"\n]*)"|(?P<other>.*))|endif\b)')

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
-
-from clfractal.records import dataclass
 
 Precision = Literal["float32", "float64"]
 FieldType = Literal["real", "int", "uint", "float", "double"]

@@ -7,7 +7,7 @@ Each lane count is tried in a child process of its own. A driver may abort on on
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
 from clfractal.device import activity, cache, isolate
@@ -22,7 +22,6 @@ from clfractal.errors import (
     Stopped,
     UntriedError,
 )
-from clfractal.records import dataclass
 
 Report = TypeVar("Report")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,6 @@ from clfractal.images.provenance import Provenance, RenderDevice
 from clfractal.images.tiled import Bands, Floats
 from clfractal.images.tiles import TILE, Region, TileGrid
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 
 CHANNELS = ("R", "G", "B", "A", "Z")
 """What a canvas holds of each pixel, so the channels of jobs that are rendered onto one."""

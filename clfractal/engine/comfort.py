@@ -8,6 +8,7 @@ review", Journal of Imaging Science and Technology 53, 2009).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -17,7 +18,6 @@ from clfractal.engine.job import Job
 from clfractal.engine.preview import Preview, points_of_depth
 from clfractal.errors import SceneError, Where
 from clfractal.images.tiled import Picture
-from clfractal.records import dataclass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo, StereoPlane

@@ -7,6 +7,7 @@ import threading
 import time
 from collections.abc import Sequence
 from contextlib import closing, suppress
+from dataclasses import dataclass
 from functools import partial
 
 from clfractal.device.cancel import CancelToken
@@ -15,7 +16,6 @@ from clfractal.engine.local_executor import LocalExecutor
 from clfractal.engine.run import Result
 from clfractal.engine.sharing import Shared
 from clfractal.errors import Stopped
-from clfractal.records import dataclass
 
 # How soon an interrupt, or a token that was set, is seen.
 _POLL_SECONDS = 0.02

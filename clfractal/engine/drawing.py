@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib import import_module
 from typing import Any
 
@@ -35,7 +35,6 @@ from clfractal.integrators.kernel import (
 from clfractal.integrators.passes import STATISTICS, kept_numbers
 from clfractal.integrators.plan import PlannedView
 from clfractal.integrators.waves import rays_of_item
-from clfractal.records import dataclass
 from clfractal.shading.cryptomatte import told
 
 TILE_PIXELS = TILE * TILE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
@@ -17,7 +18,6 @@ from clfractal.engine.varied import rounded
 from clfractal.engine.view_score import CHANNELS, COARSE, Looked, light_of, looked_at
 from clfractal.errors import SceneError, Where, arguments
 from clfractal.images.framebuffer import Framebuffer
-from clfractal.records import dataclass
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +16,6 @@ from clfractal.engine.engine import Engine
 from clfractal.engine.preview import points_of_depth
 from clfractal.errors import SceneError, Where
 from clfractal.images.framebuffer import Framebuffer
-from clfractal.records import dataclass
 from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,6 @@ from clfractal.engine.remarks import remarks_of_grid
 from clfractal.errors import SceneError, Where
 from clfractal.files import memory
 from clfractal.files.volume_file import SCENE_KEY, Volume
-from clfractal.records import dataclass
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.model import Scene

@@ -8,7 +8,7 @@ pixels again.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any, TypeAlias
 
 from clfractal.camera.views import scene_view, seen_by
@@ -25,7 +25,6 @@ from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
 from clfractal.images.tiles import Region, TileGrid
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.scene.layout import Place
 from clfractal.scene.model import Scene
 from clfractal.scene.standing import standing_alone

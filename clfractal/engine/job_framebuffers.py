@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property, partial
 from typing import Any
 
@@ -16,7 +17,6 @@ from clfractal.images.compose import Side
 from clfractal.images.develop import Development
 from clfractal.images.framebuffer import Framebuffer, in_memory
 from clfractal.images.tiled import Picture
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.sound import Sound
-from clfractal.records import dataclass
 
 BANDS: Mapping[str, tuple[float, float]] = {
     "bass": (20.0, 150.0),

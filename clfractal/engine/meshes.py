@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -20,7 +20,6 @@ from clfractal.files.document import write_document
 from clfractal.files.mesh import Mesh
 from clfractal.files.volume_file import SCENE_KEY, Volume
 from clfractal.integrators.vertices import dress, on_faces
-from clfractal.records import dataclass
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.grid_values import finite_range, in_words
 from clfractal.scene.load import load_coloring, load_scene, read_scene

@@ -7,13 +7,13 @@ orbits.
 from __future__ import annotations
 
 from collections import deque
+from dataclasses import dataclass
 
 import numpy as np
 import pyopencl as cl
 
 from clfractal.integrators.kernel import Stage, TileKernel
 from clfractal.integrators.waves import stage_name
-from clfractal.records import dataclass
 
 
 @dataclass(slots=True)

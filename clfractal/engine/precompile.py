@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, wait
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
@@ -21,7 +22,6 @@ from clfractal.engine.show import Shower
 from clfractal.engine.thumbnails import shown_scene
 from clfractal.formulas import catalog
 from clfractal.integrators.kept import Resources
-from clfractal.records import dataclass
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import VolumeRenderer

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from clfractal.device.select import by_key
 from clfractal.engine.job import Identity, Job, Paste, StereoPair
 from clfractal.engine.local_executor import LocalExecutor
@@ -12,7 +14,6 @@ from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.modes import eye_at
 from clfractal.images.probe import CHANNELS, Probe, probe_of
 from clfractal.images.tiles import Region
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

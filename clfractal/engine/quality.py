@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias, get_args
 
 from clfractal.errors import SceneError, Where, arguments, unknown_name
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 
 Quality: TypeAlias = Literal["draft", "good", "final", "print"]

@@ -7,6 +7,7 @@ mends it. Everything here follows from the job, what its rays counted and its pi
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
 from clfractal.images.tiles import Region
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.scene.checks import inside_solid, used_boxes
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.grid_place import GridPlace

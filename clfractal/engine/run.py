@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Generator, Iterable, Sequence
 from contextlib import closing
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from typing import Protocol
 
 import numpy as np
@@ -19,7 +19,6 @@ from clfractal.engine.job import Job
 from clfractal.images.provenance import RenderDevice
 from clfractal.images.tiled import TiledStore
 from clfractal.images.tiles import TILE
-from clfractal.records import dataclass, field
 
 Floats = npt.NDArray[np.float32]
 Tiles = npt.NDArray[np.int32]

@@ -12,12 +12,11 @@ import threading
 import time
 from collections import deque
 from collections.abc import Generator, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from clfractal.engine.run import NO_TILES, Tiles, WorkItem
-from clfractal.records import dataclass, field
 
 # A device that waits looks again after this time whether it should take tiles: others may be late.
 _LOOK_SECONDS = 0.02

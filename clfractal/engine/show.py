@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,6 @@ from clfractal.files.tone_names import TONES, Tone
 from clfractal.images.anaglyph import matrices
 from clfractal.images.compose import Side
 from clfractal.images.modes import BELOW, BESIDE, eye_size, picture_size
-from clfractal.records import dataclass, field
 from clfractal.scene.layout import Place
 from clfractal.scene.stereo import APART, Mode, Stereo
 

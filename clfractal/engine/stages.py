@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -9,7 +11,6 @@ from clfractal.device.select import Device
 from clfractal.images.tiles import TILE
 from clfractal.integrators.kernel import STAGE_NUMBERS, STATE_PADDING, WAVE_NUMBERS, Over, TileKernel
 from clfractal.integrators.waves import rays_group
-from clfractal.records import dataclass
 
 # Tiles of the largest launch: 1024 of them are a megapixel.
 CAPACITY = 512

@@ -6,6 +6,7 @@ Settings that only tune the search for the surface, or decide how finely it is s
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import islice
 from random import Random
 from typing import TYPE_CHECKING, Any, get_args
@@ -20,7 +21,6 @@ from clfractal.engine.vary_colors import colors_step
 from clfractal.engine.vary_formula import expanded, formula_step
 from clfractal.errors import ClfractalError, SceneError, Where, arguments, unknown_name
 from clfractal.formulas import reference
-from clfractal.records import dataclass
 from clfractal.scene.load import as_scene, check_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer

@@ -5,10 +5,10 @@ from __future__ import annotations
 import copy
 import math
 from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
 from random import Random
 from typing import Any, Literal, TypeAlias
 
-from clfractal.records import dataclass, field
 from clfractal.scene.model import Scene
 
 Strength: TypeAlias = Literal["slight", "medium", "heavy"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterator, Sequence
+from dataclasses import dataclass
 from random import Random
 from typing import Any
 
@@ -11,7 +12,6 @@ import numpy as np
 
 from clfractal.elements.lights.directional import DirectionalLight
 from clfractal.engine.varied import Step, is_locked, rounded, signed
-from clfractal.records import dataclass
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, EscapeColors
 from clfractal.scene.layout import LayoutView

@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Collection
 from copy import deepcopy
+from dataclasses import dataclass
 from random import Random
 
 from clfractal.engine.varied import Step, is_locked, rounded, signed
 from clfractal.formulas import catalog
 from clfractal.formulas.definition import BoundFormula, Formula, Parameter
 from clfractal.formulas.nodes import names_in
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 
 # The boldest steps: of a range; of a range's logarithm, and at most; of a parameter without a range, by its size; and of

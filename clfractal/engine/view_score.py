@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-
-from clfractal.records import dataclass
 
 if TYPE_CHECKING:
     from clfractal.images.framebuffer import Framebuffer

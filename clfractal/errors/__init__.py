@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
-from dataclasses import replace
-
-from clfractal.records import dataclass
+from dataclasses import dataclass, replace
 
 # Exit statuses of the shell (not sysexits: scripts only need to distinguish "fix the input" from "fix the machine").
 STATUS_BAD_INPUT = 2

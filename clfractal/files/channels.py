@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Literal
 
 from clfractal.errors import SceneError, Where, nearest, unknown_name
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, NoReturn
 
 import yaml
@@ -17,7 +18,6 @@ import yaml
 from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.files.marks import MAX_DEPTH, MERGE, Document, Node, dotted, node_from_plain
 from clfractal.files.regular import MAX_BYTES, read_text_file
-from clfractal.records import dataclass, field
 
 __all__ = ["MAX_DEPTH", "MAX_NODES", "read_document", "read_text_file", "read_value", "write_document"]
 

@@ -10,13 +10,13 @@ from __future__ import annotations
 import os
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
 
 from clfractal.files.atomic import ContentError, file_error, reading
-from clfractal.records import dataclass
 
 MAGIC = b"\x76\x2f\x31\x01"
 SCENE_ATTRIBUTE = "clfractal"

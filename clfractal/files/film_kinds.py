@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-
-from clfractal.records import dataclass, field
+from dataclasses import dataclass, field
 
 CONTAINERS: Mapping[str, str] = {".mp4": "mp4", ".mkv": "matroska", ".mov": "mov"}
 """FFmpeg's names of the files that hold films, by extension."""

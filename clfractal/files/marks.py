@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from clfractal.errors import ClfractalError, SceneError, Where
-from clfractal.records import dataclass, field
 
 MAX_DEPTH = 100
 MERGE = "<<"

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import struct
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import accumulate
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -21,7 +22,6 @@ from clfractal.errors import arguments
 from clfractal.files.atomic import atomic_writer, check_output, file_error
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.srgb import encode
-from clfractal.records import dataclass
 
 EXTENSIONS = (".ply", ".stl", ".obj", ".glb")
 """Of the formats, in lower case."""

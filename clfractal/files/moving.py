@@ -8,6 +8,7 @@ ITU-R BT.709, in its limited range. The file tells so, with the primaries of BT.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -20,7 +21,6 @@ from clfractal.files.atomic import atomic_writer, check_output, file_error
 from clfractal.files.encoding import as_usual_threads
 from clfractal.files.film_kinds import CODECS, CONTAINERS, DEFAULTS, MATROSKA, Codec, Recipe
 from clfractal.files.frame_packing import arrangements, frame_packing, with_message
-from clfractal.records import dataclass
 
 if TYPE_CHECKING:
     from av import VideoFrame

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, NoReturn, TypeVar
 
@@ -17,7 +18,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import FileError, Where, nearest, unknown_name
-from clfractal.records import dataclass, field
 
 Doubles = npt.NDArray[np.float64]
 Encoding = Literal["raw", "ascii", "hex", "gzip", "bzip2"]

@@ -9,12 +9,12 @@ exponent. Rows lie flat, in runs of whole pixels (before 1991), or with each byt
 from __future__ import annotations
 
 import re
+from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.atomic import ContentError
-from clfractal.records import dataclass, field
 
 MAGIC = (b"#?RADIANCE", b"#?RGBE")
 _LONGEST_HEADER = 1 << 16

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import struct
 from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -11,7 +12,6 @@ import numpy.typing as npt
 
 from clfractal.errors import FileError, Where
 from clfractal.files.regular import read_bytes
-from clfractal.records import dataclass
 
 MAX_BYTES = 2**31
 _WHOLE, _FLOAT, _EXTENSIBLE = 1, 3, 0xFFFE

@@ -12,6 +12,7 @@ import os
 import re
 from collections.abc import Iterable, Mapping
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Literal, cast
 
@@ -24,7 +25,6 @@ from clfractal.files.atomic import ContentError, atomic_writer, check_output, fi
 from clfractal.files.inputs import refuse_overwriting
 from clfractal.files.regular import read_text_file
 from clfractal.files.system import flush
-from clfractal.records import dataclass, field
 
 Values = npt.NDArray[Any]
 Doubles = npt.NDArray[np.float64]

@@ -8,6 +8,7 @@ one-sided or 0, never NaN because of it.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,6 @@ from clfractal.formulas.evaluate import (
     power_by_squaring,
     whole,
 )
-from clfractal.records import dataclass
 
 
 class NumpyBackend:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from typing import Any
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.definition import Add, BoundFormula
 from clfractal.formulas.turns import MAX_START, Span, spans_of
-from clfractal.records import dataclass
 
 MAX_LINKS = 64
 MAX_COUNT = 1000

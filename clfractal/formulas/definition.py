@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from functools import cached_property
 from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
@@ -13,7 +13,6 @@ from typing import Any, Literal, TypeAlias
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.evaluate import as_function, finite
 from clfractal.formulas.nodes import Call, Node, Number, names_in, substitute, walk
-from clfractal.records import dataclass
 
 # Of functions that are computed in several ways the argument that chooses.
 _CHOOSING = MappingProxyType({"pow": 1, "cpow_re": 2, "cpow_im": 2, "where": 0})

@@ -15,13 +15,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Literal, TypeGuard
 
 from clfractal.formulas.evaluate import call_float, evaluate_constant
 from clfractal.formulas.fuse import fused
 from clfractal.formulas.nodes import COMPARISONS, Call, Name, Node, Number, names_in, substitute
 from clfractal.formulas.products import Value, literal, power_over_root, whole_complex_power, whole_power
-from clfractal.records import dataclass, field
 
 NumberType = Literal["real", "dual"]
 _LIFTED = frozenset(("atan2", "min", "max", "mod"))

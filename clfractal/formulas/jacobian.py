@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from clfractal.formulas.costs import cost_of
 from clfractal.formulas.emit import Emitter
 from clfractal.formulas.fuse import needed
 from clfractal.formulas.partials import Differentiator
 from clfractal.formulas.products import Value
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TypeAlias
-
-from clfractal.records import dataclass, field
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import lru_cache, partial
 from typing import Any, Literal
 
@@ -22,7 +23,6 @@ from clfractal.formulas.jacobian import LocalJacobian, local_jacobian
 from clfractal.formulas.language import BoundFormula, Chain, Link, Name, Number, names_in, point_name
 from clfractal.formulas.products import Value, literal
 from clfractal.formulas.turns import Span
-from clfractal.records import dataclass, field
 
 # How a map is written over dual numbers: operation by operation, by its own sparse Jacobian, or as costs less.
 DualMap = Literal["operations", "jacobian", "cheapest"]

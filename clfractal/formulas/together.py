@@ -5,12 +5,12 @@ Before the constants of each stands the number of its leaf: whoever is given con
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 from clfractal.formulas.functions import Facts, each_usual, state_functions
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import FormulaText, Leaf, write_formula
-from clfractal.records import dataclass
 
 # What a formula is asked: the type of the answer, the function, and its parameters before the constants and behind them.
 _ASKED = (

@@ -8,10 +8,10 @@ its turn ends the turn. Between two places where a member starts or stops the tu
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from clfractal.errors import FormulaError, Where
-from clfractal.records import dataclass
 
 MAX_START = 1_000_000
 

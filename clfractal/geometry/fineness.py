@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from clfractal.records import dataclass
+from dataclasses import dataclass
+
 from clfractal.scene.model import Scene
 
 # In cones of the reference's pixels: the distance at which light is computed. Nearer, rough surfaces are noise; farther

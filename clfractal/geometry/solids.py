@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -13,7 +14,6 @@ from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.formulas.together import write_together
-from clfractal.records import dataclass
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, ball_of_both

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from random import Random
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.records import dataclass
 from clfractal.scene.objects import WaterObject, Waves
 from clfractal.schema.base import dot, frame_of
 

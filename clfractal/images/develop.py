@@ -9,6 +9,7 @@ developed pictures, and by the same steps the window does (`show.h`); an EXR hol
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from clfractal.files.tone import toned
 from clfractal.files.tone_names import TONES, Tone
 from clfractal.images.tiled import Bands, Floats, Picture
 from clfractal.images.tiles import Region
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

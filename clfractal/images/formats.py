@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
@@ -10,7 +11,6 @@ from clfractal.errors import FileError, Where
 from clfractal.files import atomic
 from clfractal.files.photo import LOSSLESS, MOST_PIXELS, Format
 from clfractal.images.modes import PICKED, picture_size
-from clfractal.records import dataclass
 from clfractal.scene.stereo import Stereo
 
 if TYPE_CHECKING:

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
 from clfractal.camera.views import View
-from clfractal.records import dataclass
 
 Triple = tuple[float, float, float]
 

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-
-from clfractal.records import dataclass
 
 MOST = 250
 """Devices that are told apart in one picture; all further ones count as the last."""

@@ -8,12 +8,11 @@ Tiles at the rim of the region are cut to it.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
-
-from clfractal.records import dataclass
 
 TILE = 32
 """Side of a tile, in pixels."""

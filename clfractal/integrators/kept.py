@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
 from clfractal.errors import NotReady
-from clfractal.records import dataclass, field
 
 T = TypeVar("T")
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from typing import Any, ClassVar, Literal, TypeAlias
 
 import numpy.typing as npt
@@ -19,7 +20,6 @@ from clfractal.integrators.kept import Resources
 from clfractal.integrators.passes import sampling_record, slots
 from clfractal.integrators.plan import PlannedView
 from clfractal.integrators.records import view_records
-from clfractal.records import dataclass, field
 
 KernelArgument: TypeAlias = npt.NDArray[Any] | cl.Buffer
 

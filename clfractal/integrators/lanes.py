@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from clfractal.device import cache, select, tune
@@ -22,7 +22,6 @@ from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.integrators.rounds import compared, widest
 from clfractal.integrators.trial import RULES, Marcher, Rule, picture_side
-from clfractal.records import dataclass
 
 LANES_VARIABLE = "CLFRACTAL_LANES"
 JOB = "clfractal.integrators.lanes:march_job"

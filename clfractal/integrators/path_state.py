@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 from clfractal.files.channels import CRYPTOMATTE_RANKS
-from clfractal.records import dataclass
 
 Kind = Literal["real", "vec", "color"]
 _NUMBERS: dict[Kind, int] = {"real": 1, "vec": 3, "color": 3}

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -15,7 +15,6 @@ from clfractal.files.channels import check_channels
 from clfractal.geometry.fineness import Fineness
 from clfractal.images.tiles import Region
 from clfractal.integrators.shutter import Shutter
-from clfractal.records import dataclass
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from contextlib import closing
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -20,7 +21,6 @@ from clfractal.device.watched import Watched
 from clfractal.formulas.language import Chain
 from clfractal.geometry.solids import Body
 from clfractal.integrators.declarations import struct_text
-from clfractal.records import dataclass
 
 Floats = npt.NDArray[np.float64]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -13,7 +14,6 @@ from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.geometry.objects import mirrors
 from clfractal.integrators.plan import Plan
-from clfractal.records import dataclass
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting

@@ -7,6 +7,7 @@ nothing of what a scene has, and what that does not need takes no memory.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import accumulate
 
 from clfractal.geometry.planes import has_faces
@@ -46,7 +47,6 @@ from clfractal.integrators.waves import (
     has_wide_lights,
     meets_lights,
 )
-from clfractal.records import dataclass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.shading.maps import asked_maps, bump_numbers, has_bump, has_glass, has_participating_media

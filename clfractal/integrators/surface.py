@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -40,7 +41,6 @@ from clfractal.integrators.waves import (
     most_turns,
     surface_stages,
 )
-from clfractal.records import dataclass
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.shading.environment import packed_map

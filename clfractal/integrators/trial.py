@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -29,7 +30,6 @@ from clfractal.integrators.kernel import MET_NUMBERS, STATE_PADDING
 from clfractal.integrators.march import MARCH, SHADOW_DETAIL, SHADOW_LIFT
 from clfractal.integrators.records import orbit_record
 from clfractal.integrators.waves import GOAL_SHADOW, GOAL_SURFACE, rays_group, rays_of_item
-from clfractal.records import dataclass
 from clfractal.scene.surface import SurfaceRenderer
 
 Rule = Literal["scalar", "jacobian"]

@@ -14,6 +14,7 @@ band of 300 Dobson units of ozone as one Gaussian, within about a third of what 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cached_property
 from math import exp, pi
 from typing import Any, TypeVar
@@ -22,7 +23,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
-from clfractal.records import dataclass
 
 Doubles = npt.NDArray[np.float64]
 Singles = npt.NDArray[np.float32]

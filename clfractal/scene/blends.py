@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.records import dataclass
 from clfractal.scene.materials import PARTS, PbrMaterial
 from clfractal.schema.material import BLACK
 

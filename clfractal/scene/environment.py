@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from functools import cache, cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,6 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files import resources
-from clfractal.records import dataclass
 from clfractal.scene.beside import reading_beside
 
 if TYPE_CHECKING:

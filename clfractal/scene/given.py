@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import Where
-from clfractal.records import dataclass
 from clfractal.scene.beside import reading_beside
 from clfractal.scene.grid_place import GridPlace, vector_of
 from clfractal.scene.grid_values import finite_range

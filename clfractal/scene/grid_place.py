@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TypeAlias
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.records import dataclass
 from clfractal.scene.stance import Extent
 from clfractal.schema.base import Vector, length
 

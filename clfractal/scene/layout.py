@@ -1,12 +1,11 @@
 """Several views in one picture, as in the thesis's split window."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, TypeVar
 
 from pydantic import Field
 
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.glow import Glow

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -10,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import Where
-from clfractal.records import dataclass
 from clfractal.scene.beside import reading_beside, state_of
 from clfractal.scene.named_files import Key, light_files
 from clfractal.schema.light import LightBase

@@ -6,6 +6,7 @@ document keeps the places of all values until the end, so that errors of every s
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,6 @@ from clfractal.files.file_kinds import kind_of
 from clfractal.files.inputs import noting
 from clfractal.files.marks import Document, node_from_plain, option
 from clfractal.files.regular import read_text_file
-from clfractal.records import dataclass
 from clfractal.scene.checks import check_parts
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer

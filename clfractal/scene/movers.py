@@ -1,6 +1,7 @@
 """From tracks to values: what moves a value of a scene, by keys, an expression or a table."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import exp, isfinite, log
 from typing import Any, TypeAlias
 
@@ -8,7 +9,6 @@ from clfractal.errors import FileError, FormulaError, SceneError, Where
 from clfractal.formulas.catalog import safe_path
 from clfractal.formulas.evaluate import as_function
 from clfractal.formulas.parser import parse
-from clfractal.records import dataclass
 from clfractal.scene.animation import EASES, Animation, Track
 from clfractal.scene.curves import (
     Curve,

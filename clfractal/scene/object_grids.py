@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from clfractal.errors import SceneError, Where
-from clfractal.records import dataclass
 from clfractal.scene.given import GivenGrid, read_grid
 from clfractal.scene.grid_place import GridPlace, vector_of
 from clfractal.scene.named_files import grid_files

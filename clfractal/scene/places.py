@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -12,7 +13,6 @@ from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, Where
 from clfractal.formulas import catalog, reference
 from clfractal.formulas.language import Chain
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.schema.trap import Trap
 

@@ -1,12 +1,11 @@
 """A rectangle in space: where a cut plane lies, and how it is moved and rotated."""
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Annotated, Literal, TypeVar
 
 from pydantic import Field
 
-from clfractal.records import dataclass
 from clfractal.schema.base import (
     Angle,
     Coordinate,

@@ -10,6 +10,7 @@ turbidity 3 has a luminance of 1, and middle grey comes out at 0.18.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import pi
 from typing import TYPE_CHECKING
@@ -18,7 +19,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
-from clfractal.records import dataclass
 from clfractal.scene.atmosphere import (
     EARTH,
     WAVELENGTHS,

@@ -4,12 +4,12 @@ Scene units and degrees. Plain arithmetic without NumPy, so that reading a scene
 """
 
 from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from itertools import product
 from math import atan2, degrees, hypot, inf, radians, tan
 from operator import mul
 from typing import ClassVar, Protocol, TypeAlias
 
-from clfractal.records import dataclass
 from clfractal.schema.base import Vector, cos_sin, cross, dot, length, minus, turn, unit
 
 LARGEST = 1e6

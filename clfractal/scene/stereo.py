@@ -1,12 +1,12 @@
 """Stereo: a real screen, the viewer in front of it, and how the two pictures are shown."""
 
 from collections.abc import Collection
+from dataclasses import dataclass
 from typing import Annotated, Literal
 
 from pydantic import Field
 
 from clfractal.errors import SceneError, Where
-from clfractal.records import dataclass
 from clfractal.schema.base import Direction, Position, Reflectance, Section, check_frame, problem, rule
 from clfractal.schema.fields import SCALE, Usual
 

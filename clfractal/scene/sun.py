@@ -8,13 +8,13 @@ its lower one: exponentially, as a polynomial of the height.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import lru_cache
 from math import cos, pi, radians, sin, sqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from clfractal.records import dataclass
 from clfractal.scene.atmosphere import EARTH, SUN_RADIUS, Atmosphere, Doubles
 from clfractal.scene.grid_place import vector_of
 from clfractal.scene.sky import EYE, to_rgb

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from pathlib import Path
 
@@ -11,7 +12,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.errors import Where
-from clfractal.records import dataclass
 from clfractal.scene.beside import reading_beside, state_of
 from clfractal.scene.materials import PbrMaterial
 from clfractal.scene.named_files import texture_files

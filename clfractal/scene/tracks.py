@@ -1,13 +1,12 @@
 """Which values of a scene can move, and how: the schema's fields by dotted keys."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, unknown_name
 from clfractal.files.marks import split_path
-from clfractal.records import dataclass
 from clfractal.scene.camera_base import WORDS, CameraBase, Orbit
 from clfractal.scene.formula import FormulaSpec
 from clfractal.scene.model import Scene

@@ -1,6 +1,7 @@
 """Turns errors of the schema into one line: what is allowed, what was given, and where."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Annotated, Any, Literal, TypeAlias, get_args, get_origin
 
 from pydantic import BaseModel, ValidationError
@@ -9,7 +10,6 @@ from pydantic_core import ErrorDetails
 from clfractal.errors import SceneError, Where, nearest, unknown_name
 from clfractal.errors.arguments import shown
 from clfractal.files.marks import Document, dotted
-from clfractal.records import dataclass
 
 # Words for the checks that compare with one number or a few words, filled with the check's own context.
 _ALLOWED: Mapping[str, str] = {

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from types import UnionType
 from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args, get_origin
 
 from pydantic import BaseModel
-
-from clfractal.records import dataclass
 
 Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color"]
 """How a value goes from key to key.

@@ -1,6 +1,7 @@
 """What parts of a layered material have in common: values that maps may drive, and what kernels are given."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from inspect import getdoc
 from re import split
 from types import NoneType
@@ -8,7 +9,6 @@ from typing import Annotated, Any, ClassVar, Literal, get_args, get_origin
 
 from pydantic import Field, Tag
 
-from clfractal.records import dataclass
 from clfractal.schema.fields import DIRECTION, Moves, known
 from clfractal.schema.kinds import Element
 from clfractal.schema.mapped import FORM, Map, Mapped, NumberMap

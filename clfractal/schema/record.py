@@ -1,9 +1,8 @@
 """What kernels read of an element, declared without NumPy: numbers of its own in the record of its family."""
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Literal
-
-from clfractal.records import dataclass
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -19,7 +20,6 @@ from clfractal.files.channels import (
     CRYPTOMATTE_RANKS,
     ID_CHANNELS,
 )
-from clfractal.records import dataclass
 from clfractal.schema.shape import ObjectBase
 
 if TYPE_CHECKING:

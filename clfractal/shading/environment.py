@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
@@ -21,7 +22,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.threads import in_threads
-from clfractal.records import dataclass
 from clfractal.scene.lighting import Environment
 
 if TYPE_CHECKING:

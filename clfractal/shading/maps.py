@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy.typing as npt
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.files.srgb import encode
-from clfractal.records import dataclass
 from clfractal.scene.blends import Blends, blends_of, is_costly, is_glass, is_participating, is_subsurface
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.materials import MAX_MATERIALS

@@ -9,13 +9,13 @@ its cells.
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Precision
 from clfractal.elements.lights.set import SetLight
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.places import places_of
 

@@ -7,12 +7,13 @@ negative for points in front of the screen, and the interpupillary distance for 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.camera.views import View, eye_view, middle_view
 from clfractal.errors import SceneError, Where
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.stereo import MIDDLE, Eye, EyeName, Stereo
 

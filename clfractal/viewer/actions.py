@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from typing import Literal, TypeAlias
-
-from clfractal.records import dataclass
 
 Context: TypeAlias = Literal["picture", "fly", "text"]
 """What has the keyboard: the picture, the flight (the pointer is hidden), or a text field of a panel."""

@@ -12,6 +12,7 @@ import secrets
 import sys
 import time
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -21,7 +22,6 @@ from clfractal.errors import ClfractalError
 from clfractal.files import system
 from clfractal.files.document import read_document
 from clfractal.files.regular import read_text_file
-from clfractal.records import dataclass
 from clfractal.scene.load import SceneText, load_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.formula_texts import FormulaTexts

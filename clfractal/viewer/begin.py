@@ -7,12 +7,12 @@ PyOpenGL decides where to look for functions when it is imported. So this module
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from clfractal.device.select import Device, choose
 from clfractal.files.atomic import check_output
 from clfractal.files.inputs import noting, refuse_overwriting
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.viewer import window
 from clfractal.viewer.files import Files

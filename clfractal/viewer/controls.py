@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from clfractal.images.modes import eye_at
-from clfractal.records import dataclass
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.rectangle import Plane
 from clfractal.scene.volume import VolumeRenderer

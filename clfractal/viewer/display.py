@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Protocol
 
 import numpy as np
@@ -15,7 +16,6 @@ from clfractal.device.select import Device
 from clfractal.engine.show import Look, Shower
 from clfractal.errors import ClfractalError
 from clfractal.images.tiled import Floats
-from clfractal.records import dataclass
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.preparing import internal_error
 

@@ -8,11 +8,11 @@ nothing. What is changed at a frame stays changed until another frame is shown, 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from itertools import chain
 from typing import Any, TypeAlias
 
 from clfractal.errors import SceneError
-from clfractal.records import dataclass
 from clfractal.scene.animation import Animation
 from clfractal.scene.camera_base import PLACE, CameraBase
 from clfractal.scene.curves import same

@@ -13,13 +13,13 @@ import tempfile
 import time
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 from clfractal.errors import FileError, Where
 from clfractal.files.frame_names import frames_there, is_film, kept_patterns, namer
 from clfractal.images.outputs import output_files
-from clfractal.records import dataclass
 from clfractal.scene.stereo import Stereo
 
 # Seconds that a process has to end by itself.

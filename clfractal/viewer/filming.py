@@ -6,10 +6,10 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any
 
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass
 from clfractal.scene.animation import Animation
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Set
+from dataclasses import dataclass, field
 from math import exp, isfinite, log
 from typing import Literal, TypeAlias, cast
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.records import dataclass, field
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.viewer.pointer import Floats
 from clfractal.viewer.pose import C, Style, pose_of, rotation, stood, turned_about, turning

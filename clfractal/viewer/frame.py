@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any
 
 from clfractal.device.select import Device
@@ -11,7 +11,6 @@ from clfractal.engine.canvas import Canvas
 from clfractal.engine.job import Job
 from clfractal.engine.show import Arrangement, smoothing_of
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 
 

@@ -7,6 +7,7 @@ where it is.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import hypot, isfinite, sqrt
 from typing import cast
 
@@ -15,7 +16,6 @@ import numpy.typing as npt
 
 from clfractal.camera.views import View
 from clfractal.elements.lights.directional import DirectionalLight
-from clfractal.records import dataclass
 from clfractal.scene.parts import AnyCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST
 from clfractal.schema.light import LightBase as Light

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Image
 from clfractal.scene.volume import VolumeRenderer

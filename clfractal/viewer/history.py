@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
-from clfractal.records import dataclass, field
 from clfractal.scene.model import Scene
 
 Kind = Literal["camera", "scene"]

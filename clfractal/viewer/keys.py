@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import string
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 from typing import Literal, TypeAlias
 
 from clfractal.errors import ClfractalError, Where, unknown_name
-from clfractal.records import dataclass
 from clfractal.viewer.actions import ACTIONS, Action, Context
 
 SHIFT, CTRL, ALT, SUPER = 1, 2, 4, 8

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from clfractal.records import dataclass, field
 from clfractal.scene.parts import AnyCamera
 from clfractal.viewer.flying import Fly, Key
 from clfractal.viewer.navigation import dolly, interpolated, orbit, pan

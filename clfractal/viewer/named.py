@@ -7,6 +7,7 @@ import re
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
+from dataclasses import dataclass, field
 from itertools import count
 from pathlib import Path
 from typing import Any
@@ -16,7 +17,6 @@ from clfractal.files.atomic import atomic_writer
 from clfractal.files.document import read_document
 from clfractal.files.regular import read_bytes, read_text_file
 from clfractal.formulas.catalog import safe_path
-from clfractal.records import dataclass, field
 from clfractal.scene.layout import LayoutView
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene

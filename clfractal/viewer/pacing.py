@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from clfractal.engine.carry import RENDERED
-from clfractal.records import dataclass
 
 SHOWN_AFTER = (0.1, 0.25, 0.5, 1.0, 2.0)
 """Seconds after the start of a picture at rest when it is shown anew; later every two seconds."""

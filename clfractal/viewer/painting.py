@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
@@ -16,7 +17,6 @@ from clfractal.engine.run import Progress, run
 from clfractal.errors import ClfractalError, DeviceError
 from clfractal.integrators.kept import Borrowing, Kept
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.viewer.frame import CanvasPool, Frame
 from clfractal.viewer.pacing import Pacing
 

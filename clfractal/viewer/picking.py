@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from clfractal.camera.views import View
 from clfractal.images.modes import eye_at
 from clfractal.images.tiled import Floats
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.viewer.display import Shown
 from clfractal.viewer.pointer import vector
 

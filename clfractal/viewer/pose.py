@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal, TypeAlias, TypeVar, cast
 
 import numpy as np
@@ -9,7 +10,6 @@ import numpy.typing as npt
 
 from clfractal.camera.views import camera_view
 from clfractal.errors import SceneError
-from clfractal.records import dataclass
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stance import LARGEST, NEAREST
 from clfractal.viewer.pointer import Floats

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError, DeviceError, Stopped
 from clfractal.integrators.kept import Kept
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.kept_view import cameras_of, with_cameras

@@ -9,6 +9,7 @@ import json
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self, TypeAlias
@@ -16,7 +17,6 @@ from typing import Any, Self, TypeAlias
 from clfractal.errors import FileError, Where, unknown_name
 from clfractal.files.atomic import file_error
 from clfractal.files.regular import read_text_file
-from clfractal.records import dataclass
 
 VERSION = 1
 _FORMAT = "clfractal events"

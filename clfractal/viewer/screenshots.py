@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from clfractal.files.png import SCENE_KEY, write_png_pixels
-from clfractal.records import dataclass
 from clfractal.scene.load import dump_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.own_files import is_own

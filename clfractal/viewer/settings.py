@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from dataclasses import fields
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -13,7 +13,6 @@ from clfractal.errors.arguments import shown
 from clfractal.files.atomic import atomic_writer, file_error
 from clfractal.files.document import read_document, read_text_file, write_document
 from clfractal.files.marks import Document
-from clfractal.records import dataclass, field
 from clfractal.viewer.keys import KeyMap
 
 ENVIRONMENT_VARIABLE = "CLFRACTAL_SETTINGS"

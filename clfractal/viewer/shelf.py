@@ -6,12 +6,12 @@ from collections import deque
 from collections.abc import Callable, Iterable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 
 from clfractal.engine import thumbnails
 from clfractal.engine.thumbnails import Pixels
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass
 from clfractal.scene.load import load_scene, read_text
 from clfractal.scene.model import Scene
 from clfractal.viewer.background import opaque

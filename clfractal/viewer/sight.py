@@ -5,6 +5,7 @@ Places in the picture are pixels from its upper left corner, lengths scene units
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from math import isfinite
 from typing import cast
 
@@ -13,7 +14,6 @@ import numpy.typing as npt
 
 from clfractal.camera.views import View, scene_view
 from clfractal.integrators.plan import PlannedView
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import Extent
 from clfractal.viewer.display import Shown

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import count
 from pathlib import Path
@@ -14,7 +15,6 @@ from clfractal.files import embedded
 from clfractal.files.document import read_document
 from clfractal.files.inputs import noting
 from clfractal.files.regular import read_text_file
-from clfractal.records import dataclass
 from clfractal.scene.load import SceneText, load_scene, read_text
 from clfractal.scene.model import Scene
 from clfractal.viewer.formula_texts import formula_text_in

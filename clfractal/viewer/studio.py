@@ -9,13 +9,13 @@ import threading
 import time
 from collections.abc import Callable, Hashable, Mapping
 from contextlib import suppress
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from clfractal.device.select import Device
 from clfractal.engine.show import Look
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import pairwise
 from math import dist
 from typing import TypeAlias
 
-from clfractal.records import dataclass
 from clfractal.scene.animation import Animation, Key, Track
 from clfractal.scene.model import Scene
 from clfractal.scene.movement import Movement

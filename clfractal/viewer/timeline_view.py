@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, MutableMapping
+from dataclasses import dataclass, field
 from math import ceil, floor, log10
 from typing import Any, TypeAlias, cast
 
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass, field
 from clfractal.scene.animation import Animation
 from clfractal.scene.curves import Values
 from clfractal.scene.movement import movement_of

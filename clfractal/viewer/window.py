@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import glfw
 
 from clfractal.errors import STATUS_DEVICE_FAILED, DeviceError
-from clfractal.records import dataclass
 from clfractal.viewer.recording import Event
 
 TITLE = "clfractal"

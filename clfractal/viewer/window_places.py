@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from clfractal.images.modes import BELOW, BESIDE
-from clfractal.records import dataclass
 from clfractal.scene.stereo import APART, Stereo
 
 Place = tuple[int, int, int, int]

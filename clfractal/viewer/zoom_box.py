@@ -6,7 +6,7 @@ shown in the place of the first one. A box keeps its place in the formula's spac
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import isfinite
 from typing import cast
 
@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from clfractal.camera.views import View
 from clfractal.errors import SceneError, Where
-from clfractal.records import dataclass
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.volume import Box, VolumeRenderer, Zoom

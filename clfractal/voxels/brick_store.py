@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -12,7 +12,6 @@ import pyopencl as cl
 
 from clfractal.device.cancel import CancelToken
 from clfractal.device.select import Device
-from clfractal.records import dataclass
 from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels.grid import DTYPES, NO_NORMAL, SAMPLE_BYTES, Grid, GridStats, Kind
 from clfractal.voxels.lattice import (

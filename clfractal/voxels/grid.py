@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.select import Device
-from clfractal.records import dataclass, field
 from clfractal.scene.grid_place import GridPlace
 from clfractal.voxels.lattice import BRICK, BRICK_SIDE, BRICK_STRIDE, Shape, bricks_of
 from clfractal.voxels.pool import Parts

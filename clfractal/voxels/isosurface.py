@@ -15,6 +15,7 @@ as d does and never ties. Their ratio stays below 2^8, so that a vertex tells it
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
 
@@ -22,7 +23,6 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.files.mesh import Mesh
-from clfractal.records import dataclass, field
 
 Values = npt.NDArray[Any]
 Doubles = npt.NDArray[np.float64]

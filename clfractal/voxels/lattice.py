@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.structs import Field, Precision, Struct
-from clfractal.records import dataclass
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.volume import MAX_RESOLUTION, Box
 from clfractal.schema.base import Vector

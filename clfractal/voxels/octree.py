@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.records import dataclass
 from clfractal.voxels.lattice import BRICK, Lattice, Places, Shape, all_places, pack_places, unpack_places
 
 # Nodes to begin with: too few leave a device idle, and large nodes are seldom empty.

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,6 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device.select import Device
-from clfractal.records import dataclass
 from clfractal.voxels.lattice import BRICK_STRIDE
 
 MOST_PARTS = 4

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import pyopencl as cl
@@ -17,7 +18,6 @@ from clfractal.device.source import FlatText, flatten
 from clfractal.device.structs import Precision
 from clfractal.device.threads import ending_together
 from clfractal.geometry.solids import Body
-from clfractal.records import dataclass
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.voxels.grid import Kind
 from clfractal.voxels.lattice import BRICK, EXTENT, LATTICE

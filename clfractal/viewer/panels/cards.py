@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Hashable
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.buttons import area, clipped
 from clfractal.viewer.panels.ui import Ui

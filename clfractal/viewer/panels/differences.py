@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 from clfractal.viewer.editing import plain

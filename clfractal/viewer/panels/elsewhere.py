@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 from typing import Literal, get_args, get_origin
 
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.scene.model import Scene
 from clfractal.schema.base import Section
 from clfractal.viewer.panels import layout, theme

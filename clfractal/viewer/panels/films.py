@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from pathlib import Path
 
 from imgui_bundle import imgui, imgui_ctx
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.film_kinds import CONTAINERS
-from clfractal.records import dataclass
 from clfractal.scene.animation import Animation
 from clfractal.viewer.film_queue import FilmOrder, RenderedFilm
 from clfractal.viewer.number_words import counted

@@ -7,7 +7,7 @@ keeps its last good formula and picture.
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +19,6 @@ from clfractal.files.document import read_document, read_text_file, write_docume
 from clfractal.files.fragments import same
 from clfractal.files.resources import folder
 from clfractal.formulas import catalog
-from clfractal.records import dataclass, field
 from clfractal.scene.formula import FormulaSpec
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w

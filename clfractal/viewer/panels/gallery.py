@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,6 @@ from imgui_bundle import imgui
 
 from clfractal.engine.thumbnails import SAMPLES, SIZE
 from clfractal.files import resources
-from clfractal.records import dataclass, field
 from clfractal.viewer.number_words import counted
 from clfractal.viewer.panels import cards, theme
 from clfractal.viewer.panels import widgets as w

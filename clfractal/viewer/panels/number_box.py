@@ -10,12 +10,11 @@ import ast
 import math
 import operator
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels.buttons import area
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, TypeVar
 
 from imgui_bundle import imgui, imgui_ctx
 
-from clfractal.records import dataclass
 from clfractal.scene.parts import MAX_SIDE
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from imgui_bundle import imgui, imgui_ctx
 
-from clfractal.records import dataclass
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.viewer.panels import (
     camera,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable
+from dataclasses import dataclass
 from itertools import count
 from pathlib import Path
 
@@ -12,7 +13,6 @@ from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import PICTURES
 from clfractal.images.formats import Content, check_output
 from clfractal.images.outputs import output_files
-from clfractal.records import dataclass
 from clfractal.scene.parts import MAX_PIXELS, Image
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still

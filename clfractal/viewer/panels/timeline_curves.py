@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.scene.animation import Animation
 from clfractal.scene.curves import Values
 from clfractal.viewer import timeline_edits as timeline

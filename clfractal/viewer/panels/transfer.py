@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -12,7 +13,6 @@ from typing import Any
 import numpy as np
 from imgui_bundle import imgui
 
-from clfractal.records import dataclass
 from clfractal.scene.given import GivenGrid
 from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer

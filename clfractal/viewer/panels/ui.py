@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Hashable
+from dataclasses import dataclass, field
 from typing import Any, Protocol, TypeVar, cast
 
 import numpy as np
 import numpy.typing as npt
 
 from clfractal.engine.comfort import Comfort
-from clfractal.records import dataclass, field
 from clfractal.viewer.display import Shown
 from clfractal.viewer.keys import KeyMap
 from clfractal.viewer.panels import theme

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -21,7 +22,6 @@ from clfractal.engine.variations import (
 )
 from clfractal.engine.varied import Kind, Strength
 from clfractal.errors import ClfractalError
-from clfractal.records import dataclass, field
 from clfractal.scene.load import check_scene
 from clfractal.scene.model import Scene
 from clfractal.viewer.panels import cards, layout, right_dock, theme
