@@ -38,11 +38,14 @@ import os, sys, time
 from clfractal.images.store import JournalFramebuffer
 put, most, stored = JournalFramebuffer.put_tiles, int(sys.argv.pop(1)), []
 
-def held(framebuffer, indices, *arguments):
-    put(framebuffer, indices, *arguments)
-    stored.extend(indices)
-    while len(stored) >= most and not os.path.exists("go"):
-        time.sleep(0.005)
+def held(framebuffer, indices, tiles, *more):
+    # (A launch may have all tiles of a picture.)
+    now = max(most - len(stored), 0)
+    for some in (slice(now), slice(now, None)):
+        put(framebuffer, indices[some], tiles[some], *more)
+        stored.extend(indices[some])
+        while len(stored) >= most and not os.path.exists("go"):
+            time.sleep(0.005)
 
 JournalFramebuffer.put_tiles = held
 sys.argv[0] = "clfractal"
