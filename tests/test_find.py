@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import signal
 from itertools import combinations
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from clfractal.formulas import reference
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.tiles import Region
 from clfractal.scene.model import Scene
-from tests.shell import InProcess, works
+from tests.shell import InProcess, Running, works
 
 # A closed hall: a ball is cut out of a box, with columns in it and a lamp.
 HALL = """\
@@ -188,6 +189,12 @@ def test_one_scene_with_bookmarks(clf: InProcess) -> None:
     assert list(found.bookmarks) == ["mine", "view 1", "view 2"]
     assert found.camera == found.bookmarks["view 1"]
     assert [path.name for path in Path().iterdir() if "view" in path.name] == ["views.yaml"]
+    # A second round keeps the first one's.
+    works(clf("find", "views.yaml", "-n", "1", "--seed", "1", "-o", "more.yaml", "--quiet"))
+    more = clfractal.load_scene(Path("more.yaml"))
+    assert list(more.bookmarks) == ["mine", "view 1", "view 2", "view 3"]
+    assert {name: more.bookmarks[name] for name in found.bookmarks} == found.bookmarks
+    assert more.camera == more.bookmarks["view 3"]
 
 
 REFUSED = {
@@ -201,6 +208,9 @@ REFUSED = {
     ("-o", "views.yaml", "--sheet", "views.yaml"): "views.yaml: unknown extension",
     ("--set", "lights=[]"): "scene.yaml: no view was found",
     ("--device", "abacus"): "abacus",
+    ("--device", "abacus", "-o", "new"): "abacus",
+    ("--set", "lights=[]", "-o", "new"): "scene.yaml: no view was found",
+    ("--set", "lights=[]", "--set", "output.exposure=auto"): "scene.yaml: no view was found",
 }
 
 
@@ -209,3 +219,14 @@ def test_what_is_refused(clf: InProcess, options: tuple[str, ...]) -> None:
     Path("scene.yaml").write_text(SPONGE)
     assert clf("find", "scene.yaml", "--quiet", *options).is_one_line(2, REFUSED[options])
     assert [path.name for path in Path().iterdir()] == ["scene.yaml"]
+
+
+def test_an_interrupt_leaves_nothing_behind(tmp_path: Path) -> None:
+    (tmp_path / "scene.yaml").write_text(SPONGE)
+    running = Running(tmp_path, "find", "scene.yaml", "-n", "100", "-o", "new")
+    running.wait_until((tmp_path / "new").exists)
+    running.wait_until_it_listens()
+    status, told = running.ended_by(signal.SIGINT)
+    assert status == 130
+    assert told.endswith("clfractal: interrupted; nothing was written\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["scene.yaml"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -93,7 +94,7 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
 
     pictures: list[Pixels] = []
     shell.state = lambda: "clfractal: interrupted; nothing was written"
-    with Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
+    with choice.folder_made(), Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
         found = found_views(scene, engine, count=choice.count, seed=choice.seed)
 
         def picture(view: FoundView) -> Framebuffer:
@@ -116,12 +117,17 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
             f"Views of {Path(order.scene).name} (seed {choice.seed}); the camera is the first of the bookmarks"
         ]
         write_scene(choice.output, moved.text(_with_bookmarks(scene, found)), lines)
-        shell.say(f"{choice.output}: {len(found)} bookmarks")
+        shell.state = lambda: f"clfractal: interrupted; {choice.output} is written"
+        shell.say(f"{choice.output}: {_counted(found, 'bookmark')}")
     for line in choice.save_sheets(pictures):
         shell.say(line)
     shell.state = lambda: "clfractal: interrupted"
     few = f" (no more of {choice.count} differ and show as much)" if len(found) < choice.count else ""
-    shell.say(f"{len(found)} views{few}: {time.perf_counter() - begun:.2f} s")
+    shell.say(f"{_counted(found, 'view')}{few}: {time.perf_counter() - begun:.2f} s")
+
+
+def _counted(found: list[FoundView], thing: str) -> str:
+    return f"{len(found)} {thing}{'' if len(found) == 1 else 's'}"
 
 
 def _check_files(scene: Scene, choice: Choice, names: list[str], source: str) -> None:
@@ -141,7 +147,12 @@ def _check_files(scene: Scene, choice: Choice, names: list[str], source: str) ->
 
 
 def _with_bookmarks(scene: Scene, found: list[FoundView]) -> Scene:
-    digits = len(str(len(found)))
-    cameras = {f"view {number:0{digits}d}": view.scene.camera for number, view in enumerate(found, start=1)}
+    """The scene with the best view, and all of them as bookmarks after its own, whose names they do not take."""
+    known = [re.fullmatch(r"view 0*(\d{1,9})", name) for name in scene.bookmarks]
+    last = max((int(each[1]) for each in known if each), default=0)
+    digits = len(str(last + len(found)))
+    cameras = {
+        f"view {number:0{digits}d}": view.scene.camera for number, view in enumerate(found, start=last + 1)
+    }
     best = found[0].scene
     return best.model_copy(update={"bookmarks": {**scene.bookmarks, **cameras}})

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeAlias
@@ -70,15 +71,27 @@ class Proposals:
         return [f"{source.stem}-{number:0{digits}d}" for number in range(1, self.count + 1)]
 
     def check_files(self, scene: Scene, names: Sequence[str]) -> None:
-        """Makes the folder if it is missing, and refuses files that exist, before anything is rendered."""
+        """Refuses files that exist, and a folder that cannot be made, before anything is rendered."""
         suffixes = (".yaml",) if self.is_sheet else (".yaml", ".png")
         files = [self.folder / f"{name}{suffix}" for name in names for suffix in suffixes]
         refuse_existing((*self.sheets, *files), self.sheets)
         self.check_sheets()
+        with self.folder_made():
+            check_output(files[0], (".yaml",))
+        refuse_overwriting([*files, *self.sheets], scene.files)
+
+    @contextmanager
+    def folder_made(self) -> Iterator[None]:
+        """Makes the folder if it is missing; where nothing was written to it, it is gone again at the end."""
+        missing = not self.folder.exists()
         with naming(self.folder, "cannot be made"):
             self.folder.mkdir(exist_ok=True)
-        check_output(files[0], (".yaml",))
-        refuse_overwriting([*files, *self.sheets], scene.files)
+        try:
+            yield
+        finally:
+            if missing:
+                with suppress(OSError):  # it holds something
+                    self.folder.rmdir()
 
     def check_sheets(self) -> None:
         """Raises FileError for pictures of all that cannot be written."""

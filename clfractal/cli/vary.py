@@ -81,7 +81,7 @@ def _vary(order: Order, choice: Choice, shell: Shell) -> None:
     from clfractal.engine.engine import Engine
 
     pictures: list[Pixels] = []
-    with Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
+    with choice.folder_made(), Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
         shell.state = lambda: (
             f"clfractal: interrupted with {len(pictures)} of {choice.count} variations written"
         )

@@ -99,6 +99,7 @@ def find(
     """Looks for views of a scene's set that are worth a look: places near it and within, with depth and light.
 
     Views differ from each other, and the best comes first. Equal arguments find the same ones on one kind of device.
+    Their cameras are in perspective and sharp everywhere, whatever the scene's own is; an animation is left out.
 
     Args:
         scene: a scene with the surface renderer, or what `load_scene` takes. Its camera tells what is up and, where there
@@ -159,6 +160,9 @@ class _Finder:
         self.bright = 1.0
         self.up = tuple(scene.camera.said["up"])
         output = scene.output.model_copy(update={"denoise": False})
+        # What is dark in the scene is dark here, too: no picture has an exposure of its own.
+        if output.exposure == "auto":
+            output = output.model_copy(update={"exposure": engine.settled(scene).output.exposure})
         plain = self.scene.model_copy(update={"output": output, "bookmarks": {}})
         self.looks = [small_scene(plain, *size) for size in _LOOKS]
 
@@ -310,7 +314,7 @@ class _Finder:
         camera = self._camera(stand, min(tried.seen.depth, 10 * self.seen.radius))
         room = float(self.seen.room(np.array([[x, y, z]]))[0])
         remark = (
-            f"score {tried.score:.2f}; {tried.stand.fov:.0f}° wide; depth {tried.seen.layers:.1f}-fold,"
+            f"score {tried.score:.2f}; {tried.stand.fov:.0f}° high; depth {tried.seen.layers:.1f}-fold,"
             f" room {room / self.seen.radius:.2f} of the radius"
         )
         return FoundView(self.scene.model_copy(update={"camera": camera}), tried.score, room, remark)
