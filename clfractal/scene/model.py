@@ -155,7 +155,9 @@ class Scene(Section):
         # Here, because NumPy takes long to import.
         from clfractal.scene.seen import Seen
 
-        return Seen(self, camera.position, self.extent)
+        # On which side of floors one is, the camera says that shows all: before it is framed it may stand anywhere.
+        eye = camera.framed(self.extent, self.image.width / self.image.height).position
+        return Seen(self, eye, self.extent)
 
     @property
     def has_set(self) -> bool:

@@ -185,6 +185,28 @@ def test_a_volume_is_seen_as_far_as_its_box() -> None:
     assert found.height == pytest.approx(1 / 0.9, abs=0.03)
 
 
+def test_on_which_side_of_a_floor_one_is_the_framed_camera_says() -> None:
+    """Angles alone say where it stands: above a floor that is above the origin, about which they turn before."""
+    objects = {
+        "floor": {"type": "plane", "position": [0, 0, 5]},
+        "ball": {"type": "sphere", "radius": 0.5, "position": [0, 0, 8]},
+    }
+    orbit = {"azimuth": 20, "elevation": 20}
+    found = load_scene(
+        {"version": 1, "formula": "none", "camera": {"frame": "seen", "orbit": orbit}, "objects": objects}
+    ).camera
+    alone = load_scene(
+        {
+            "version": 1,
+            "formula": "none",
+            "camera": {"frame": "seen", "orbit": orbit},
+            "objects": {"ball": objects["ball"]},
+        }
+    ).camera
+    np.testing.assert_allclose(found.position, alone.position, atol=0.01)
+    np.testing.assert_allclose(found.target, alone.target, atol=0.01)
+
+
 @pytest.mark.parametrize("extra", [{}, {"renderer": {"type": "cut_plane"}}])
 def test_where_nothing_is_seen_the_bounds_are(extra: dict[str, Any]) -> None:
     """Or where a picture shows no more of them than a plane."""
