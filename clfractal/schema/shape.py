@@ -82,7 +82,7 @@ class Simple(Joined):
 
     @abstractmethod
     def away(self, points: "Floats") -> "Floats":
-        """How far points of shape (n, 3) are from it, scene units, or less than that; below 0 inside."""
+        """How far points of shape (n, 3) are from it, scene units; below 0 inside. Or less than that, either way."""
 
 
 class Level(ObjectBase):

@@ -91,6 +91,10 @@ def check_inside(known: Known) -> None:
     away = it.away(points)
     assert ((away < 0) == held)[clear].all()
     check_away(it, points[~held], far[~held])
+    # Nor is a place said to be deeper inside than it is.
+    for way in np.random.default_rng(7).normal(size=(40, 3)):
+        moved = points[held] + 0.999 * away[held, None] * (way / np.linalg.norm(way))
+        assert (known.distance(moved) <= 1e-9).all()
 
 
 def check_away(it: Solid, points: Floats, far: Floats) -> None:

@@ -39,7 +39,7 @@ class SphereObject(Solid):
 
         own, long = self.own_places(points)
         out = np.linalg.norm(own / long, axis=1)
-        # To the first order near its surface, and never more than the longest axis allows.
+        # Outside to the first order near its surface, and never more than the longest axis allows.
         slope = np.maximum(np.linalg.norm(own / long**2, axis=1), 1e-300)
-        near = np.where(out > 0, out * (out - 1) / slope, -long.min())
-        return np.asarray(np.clip(near, (out - 1) * long.min(), (out - 1) * long.max()))
+        least, most = (out - 1) * long.min(), (out - 1) * long.max()
+        return np.asarray(np.where(out > 1, np.clip(out * (out - 1) / slope, least, most), least))
