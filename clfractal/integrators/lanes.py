@@ -10,6 +10,7 @@ on it.
 from __future__ import annotations
 
 import os
+import time
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -274,5 +275,9 @@ def _raced(
     """Nanoseconds a pixel by a rule with each lane count, and whether they can be relied on."""
     side = picture_side(device, rule)
     marchers = {lanes: Marcher(device, precision, lanes, rule, side) for lanes in lane_counts}
-    least, is_steady = compared(lane_counts, lambda lanes: marchers[lanes].milliseconds())
+    # A device that is slow shall not look like one that hangs: a quarter of the limit is left to both rules' rounds.
+    end = time.monotonic() + _TIMEOUT_S * len(lane_counts) / (4 * len(RULES))
+    least, is_steady = compared(
+        lane_counts, lambda lanes: marchers[lanes].milliseconds(), lambda: time.monotonic() > end
+    )
     return [1e6 * least[lanes] / side**2 for lanes in lane_counts], is_steady

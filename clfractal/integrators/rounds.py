@@ -23,16 +23,19 @@ def widest(times: Mapping[int, float]) -> int:
     return max(lanes for lanes, time in times.items() if time <= NEARLY * best)
 
 
-def compared(lane_counts: Sequence[int], measure: Callable[[int], float]) -> tuple[dict[int, float], bool]:
+def compared(
+    lane_counts: Sequence[int], measure: Callable[[int], float], spent: Callable[[], bool] = lambda: False
+) -> tuple[dict[int, float], bool]:
     """The least time of each lane count, and whether it can be relied on.
 
     Args:
         lane_counts: what is compared.
         measure: the time of a lane count, in any unit, each time it is called.
+        spent: whether it has taken so long that a round for each half has to do.
     """
     halves: tuple[dict[int, float], dict[int, float]] = ({}, {})
     for number in range(MOST):
-        if number >= FEWEST and number % 2 == 0 and agree(*halves):
+        if number % 2 == 0 and number > 0 and (spent() or (number >= FEWEST and agree(*halves))):
             break
         half = halves[number % 2]
         # Back and forth, in either half: none always comes after the same other.

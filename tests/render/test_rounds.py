@@ -71,6 +71,15 @@ def test_a_machine_that_is_never_quiet_is_told() -> None:
     assert not compared([16], lambda lanes: next(numbers))[1]
 
 
+def test_a_slow_device_has_a_round_for_each_half() -> None:
+    machine = Machine()
+    assert compared([8, 16], machine.measure, lambda: len(machine.asked) > 1) == (QUIET, True)
+    assert len(machine.asked) == 4
+    busy = Machine(lambda turn: 1.0 if turn // 2 % 2 else 1.3)
+    assert compared([8, 16], busy.measure, lambda: len(busy.asked) > 4) == (QUIET, False)
+    assert len(busy.asked) == 8
+
+
 def test_halves_agree_where_nothing_hangs_on_what_differs() -> None:
     """One lane takes five times as long, or seven times: that decides nothing."""
     assert agree({1: 50, 8: 11, 16: 10}, {1: 70, 8: 11, 16: 10})
