@@ -15,6 +15,16 @@ STAGE(find_materials) {
     STAGE_BEGINS(s, w);
     if (paths_are_over(s)) return;
     interaction here = interaction_kept(s, bounce);
+#if LANES > 1
+    // These lanes may be gathered beside others (`lane_shares.h`), and what is looked up for all of them has to be numbers.
+    if (!any_lane(mask_of(here.found))) {
+        pbr nothing;
+        for (int n = 0; n < NUMBERS_OF(pbr); ++n) ((real *)&nothing)[n] = R(0.0);
+        matter_keep(s, &nothing);
+        const relief flat = {R(0.0), vec_of(R(0.0), R(0.0), R(0.0))};
+        if (KEEPS(s, STATE_RELIEF)) STATE_KEEP(s, flat, STATE_RELIEF);
+    }
+#endif
     if (!any_lane(mask_of(here.found))) return;
     const camera_sample a = camera_sample_kept(s);
     path so_far;
