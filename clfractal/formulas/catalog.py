@@ -31,7 +31,13 @@ _CHAIN_KEYS = (
 @cache
 def names() -> tuple[str, ...]:
     """The library's names, sorted: formulas and chains that have a set (see `Formula.alone`)."""
-    return tuple(name for name in library_names() if not description(name).get("alone"))
+    return tuple(name for name in library_names() if not _is_alone(name))
+
+
+def _is_alone(name: str) -> bool:
+    # (Few say anything of it, and to read all files takes as long as a shell's user notices.)
+    text = (folder("formulas/library") / f"{name}.yaml").read_text(encoding="utf-8")
+    return "alone:" in text and bool(description(name).get("alone"))
 
 
 @cache
