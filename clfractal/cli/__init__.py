@@ -65,11 +65,9 @@ def _start_fast() -> None:
 
     Searches for garbage find none among what modules leave behind, and take a tenth of the start: see `app.call`. The
     others are settings of libraries, which the user's own come before: plug-ins are looked for in every installed package,
-    and a pool of threads for matrices, which are all small here, is made by the import of NumPy. pyopencl's helpers load
-    attrs, if it is there, for a cache that is not used; so to this process it is not there.
+    and a pool of threads for matrices, which are all small here, is made by the import of NumPy.
     """
     gc.disable()
-    sys.modules.setdefault("attrs", None)  # type: ignore[arg-type]
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
