@@ -2,6 +2,7 @@
 
 import math
 from abc import abstractmethod
+from collections.abc import Sequence
 from functools import reduce
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, TypeAlias
 
@@ -140,6 +141,22 @@ class Solid(Simple):
         axes = np.array(self.axes)
         long = np.linalg.norm(axes, axis=1)
         return (points - self.position) @ (axes / long[:, None]).T, long
+
+
+def from_surface(value: "Floats", slopes: Sequence["Floats"], steepest: float) -> "Floats":
+    """How far points are from where a function is 0 that is convex above it, or less than that; below 0 where it is below.
+
+    A convex function lies above its tangents, so no step from outside that is shorter than value / |slopes| gets there.
+
+    Args:
+        value: the function, shape (n,).
+        slopes: its derivatives where it is above 0, scene units.
+        steepest: the most that it changes in a step of one scene unit, where it is below.
+    """
+    import numpy as np
+
+    steep = np.sqrt(sum(slope**2 for slope in slopes))
+    return np.asarray(value / np.where(value > 0, np.maximum(steep, 1e-300), steepest))
 
 
 def solids() -> tuple[type[Solid], ...]:

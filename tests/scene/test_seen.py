@@ -185,6 +185,20 @@ def test_a_volume_is_seen_as_far_as_its_box() -> None:
     assert found.height == pytest.approx(1 / 0.9, abs=0.03)
 
 
+@pytest.mark.parametrize(
+    ("kind", "half"), [("sphere", 30.0), ("cylinder", 30.0), ("cone", 30.0), ("torus", 30 * 1.3)]
+)
+def test_long_solids_are_seen_as_long_as_they_are(kind: str, half: float) -> None:
+    """From above, thirty times as long as they are wide."""
+    more = {"torus": {"radius": 1, "tube": 0.3}}.get(kind, {"radius": 1})
+    objects = {"it": {"type": kind, "scale": [1, 30, 1], **more}}
+    camera = {"projection": "orthographic"}
+    found = scene({**camera, "orbit": {"elevation": 90}}, (30, 90), objects=objects).camera
+    assert isinstance(found, OrthographicCamera)
+    assert found.height == pytest.approx(2 * half / 0.9, rel=0.01)
+    assert found.target[1] == pytest.approx(0, abs=0.01 * half)
+
+
 def test_on_which_side_of_a_floor_one_is_the_framed_camera_says() -> None:
     """Angles alone say where it stands: above a floor that is above the origin, about which they turn before."""
     objects = {

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from clfractal.schema.base import Amount, Length, Vector
 from clfractal.schema.fields import SCALE
-from clfractal.schema.shape import Solid
+from clfractal.schema.shape import Solid, from_surface
 
 if TYPE_CHECKING:
     from clfractal.schema.shape import Floats
@@ -52,8 +52,13 @@ class ConeObject(Solid):
         own, long = self.own_places(points)
         x, y, z = (own / long).T
         lower, upper, _ = self.form
-        out, wide = np.hypot(x, y), long[:2].min()
+        out, wide, lean = np.hypot(x, y), long[:2].min(), (lower - upper) / 2 / long[2]
+        near = np.maximum(out, 1e-300)
+        slopes = (x / near / long[0], y / near / long[1])
         # Its side leans: a step out of it is longer than the way to it. Beyond its rims the cylinder around it is nearer.
-        lean = np.hypot(1 / wide, (upper - lower) / 2 / long[2])
-        side = np.maximum((out - ((1 - z) * lower + (1 + z) * upper) / 2) / lean, (out - 1) * wide)
+        radius = ((1 - z) * lower + (1 + z) * upper) / 2
+        side = np.maximum(
+            from_surface(out - radius, (*slopes, np.full_like(z, lean)), np.hypot(1 / wide, lean)),
+            from_surface(out - 1, slopes, 1 / wide),
+        )
         return np.asarray(np.maximum(side, np.abs(own[:, 2]) - long[2]))

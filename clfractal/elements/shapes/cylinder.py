@@ -6,7 +6,7 @@ from pydantic import Field
 
 from clfractal.schema.base import Length, Vector
 from clfractal.schema.fields import SCALE
-from clfractal.schema.shape import Solid
+from clfractal.schema.shape import Solid, from_surface
 
 if TYPE_CHECKING:
     from clfractal.schema.shape import Floats
@@ -40,5 +40,8 @@ class CylinderObject(Solid):
         import numpy as np
 
         own, long = self.own_places(points)
-        around = np.hypot(*(own[:, :2] / long[:2]).T) - 1
-        return np.asarray(np.maximum(around * long[:2].min(), np.abs(own[:, 2]) - long[2]))
+        x, y = (own[:, :2] / long[:2]).T
+        out = np.hypot(x, y)
+        near = np.maximum(out, 1e-300)
+        around = from_surface(out - 1, (x / near / long[0], y / near / long[1]), 1 / long[:2].min())
+        return np.asarray(np.maximum(around, np.abs(own[:, 2]) - long[2]))

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from clfractal.schema.base import Length, Vector, length
 from clfractal.schema.fields import SCALE
-from clfractal.schema.shape import Solid
+from clfractal.schema.shape import Solid, from_surface
 
 if TYPE_CHECKING:
     from clfractal.schema.shape import Floats
@@ -34,12 +34,10 @@ class SphereObject(Solid):
         return length(self.own_place(point)) < 1
 
     def away(self, points: "Floats") -> "Floats":
-        """As of every shape; from far away that of a ball in the place of an ellipsoid."""
+        """As of every shape."""
         import numpy as np
 
         own, long = self.own_places(points)
         out = np.linalg.norm(own / long, axis=1)
-        # Outside to the first order near its surface, and never more than the longest axis allows.
-        slope = np.maximum(np.linalg.norm(own / long**2, axis=1), 1e-300)
-        least, most = (out - 1) * long.min(), (out - 1) * long.max()
-        return np.asarray(np.where(out > 1, np.clip(out * (out - 1) / slope, least, most), least))
+        slopes = (own / long**2).T / np.maximum(out, 1e-300)
+        return from_surface(out - 1, list(slopes), 1 / long.min())

@@ -7,7 +7,7 @@ from pydantic import Field
 
 from clfractal.schema.base import Length, Vector, problem, rule
 from clfractal.schema.fields import SCALE
-from clfractal.schema.shape import Solid
+from clfractal.schema.shape import Solid, from_surface
 
 if TYPE_CHECKING:
     from clfractal.schema.shape import Floats
@@ -61,4 +61,11 @@ class TorusObject(Solid):
         x, y, z = (own / long).T
         ring, tube, _ = self.form
         # (In units of the distance from its middle to its rim, in which its tube is round.)
-        return np.asarray((np.hypot(np.hypot(x, y) - ring, tube * z) - tube) * min(*long[:2], long[2] / tube))
+        out, steepest = np.hypot(x, y), 1 / min(*long[:2], long[2] / tube)
+        off, high = out - ring, tube * z
+        away = np.hypot(off, high)
+        outward, upward = off / np.maximum(away, 1e-300), high / np.maximum(away, 1e-300)
+        near = np.maximum(out, 1e-300)
+        slopes = (outward * x / near / long[0], outward * y / near / long[1], upward * tube / long[2])
+        # Within its ring it is not convex.
+        return np.where(off > 0, from_surface(away - tube, slopes, steepest), (away - tube) / steepest)
