@@ -18,12 +18,12 @@ def check_alone(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for what needs a formula where there is none."""
     if scene.has_set:
         return
-    renderer = scene.renderer
+    renderer, name = scene.renderer, scene.chain.first.formula.name
     if not isinstance(renderer, SurfaceRenderer) and not _shows_a_file(renderer):
-        message = f"none is for surface renderers, got a {renderer.type}; name a formula"
+        message = f"{name} is for surface renderers, got a {renderer.type}; name a formula"
         raise SceneError(message, Where(path="formula"))
     for path, what, way_out in _asking(scene):
-        raise SceneError(f"{what} a formula, and the scene's is none; {way_out}".lstrip(), Where(path=path))
+        raise SceneError(f"{what} a formula, and the scene's is {name}; {way_out}".lstrip(), Where(path=path))
 
 
 def _shows_a_file(renderer: Renderer) -> bool:
