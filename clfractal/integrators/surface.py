@@ -46,7 +46,7 @@ from clfractal.scene.model import Scene
 from clfractal.shading.environment import packed_map
 from clfractal.shading.light_records import light_records, light_tables, tables_key
 from clfractal.shading.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
-from clfractal.shading.materials import PBR, pbr_text, scattering_defines
+from clfractal.shading.materials import PBR, pbr_text, scattering_defines, weighed_text
 from clfractal.shading.scattering import albedo_tables, glass_tables
 from clfractal.shading.set_lights import set_light_data, set_lights_of
 
@@ -262,6 +262,7 @@ def _structs() -> dict[str, str]:
         "structs.h": struct_text() + CUT_PLANE.c_text(),
         "path_state.h": path_state_text() + state_text(),
         "pbr.h": pbr_text(),
+        "weighed.h": weighed_text(),
     }
 
 

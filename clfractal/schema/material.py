@@ -55,6 +55,8 @@ class Part(Mapped, Element):
     """Its fields that are 0 in a material that is a matt body and nothing else."""
     costly: ClassVar[tuple[str, ...]] = ()
     """Its fields that ask for a stage of its own where they are above 0: `costly` in its kernel files' folder."""
+    counts_by_weight: ClassVar[bool] = False
+    """Whether in a blend its other fields count by `weight`, its first one: half a red coat beside none stays red."""
     at_spots: ClassVar[bool] = True
     """Whether its fields are parameters in each lane."""
 

@@ -66,6 +66,20 @@ def parameter_numbers() -> dict[str, tuple[int, int]]:
     return found
 
 
+def weighed_text() -> str:
+    """Which numbers of a material count by weights in a blend (`material_at.h`)."""
+    numbers, listed = parameter_numbers(), []
+    for part in PARTS:
+        if part.counts_by_weight:
+            weight, *others = (numbers[each.name] for each in part.parameters())
+            listed.append(f"{{{weight[0]}, {sum(count for _, count in others)}}}")
+    return (
+        "// Of each part of a material whose numbers count by its weight: the number of that weight, and how many follow.\n"
+        f"#define WEIGHED_PARTS {len(listed)}\n"
+        f"__constant const int WEIGHED[WEIGHED_PARTS][2] = {{{', '.join(listed)}}};\n"
+    )
+
+
 # What `pbr_text` adds to them.
 MORE_NUMBERS = 3
 

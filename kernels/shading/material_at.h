@@ -1,32 +1,46 @@
 // The material of an interaction: what paths scatter by.
+#include "weighed.h"
 NUMBERS_PICKED(pbr)
 
-// Materials are mixed by the shares that they have in an interaction. A colour counts by the light that it colours: that of a body which a
-// medium hides counts for nothing.
+// Materials are mixed by the shares that they have in an interaction. What a part of them has counts by the weight of that part, and the
+// body's colour by the light that meets the body: neither what goes through it nor what goes into it.
 typedef struct {
     pbr sum;
-    real body, medium;   // how much of the light meets the bodies and the media of all parts
+    real weights[WEIGHED_PARTS], body;
 } pbr_mix;
 
-// Scales what only the light that meets the body, and the medium, is coloured by.
-INLINE void pbr_weigh(pbr *p, real body, real medium) {
-    p->base_color = color_scale(p->base_color, body);
-    p->subsurface_color = color_scale(p->subsurface_color, medium);
-    p->subsurface_radius *= medium;
+// What a part counts by at least, so that it is something where it has no weight in any material.
+#define LEAST_WEIGHT R(1e-4)
+
+// How much of the light meets the body.
+INLINE real pbr_body(const pbr *p) {
+    const real dielectric = R(1.0) - p->base_metalness;
+    return LEAST_WEIGHT + (R(1.0) - p->transmission_weight * dielectric) * (R(1.0) - p->subsurface_weight * dielectric);
 }
 
-INLINE void pbr_add(pbr_mix *m, pbr part, real share, world w) {
-    if (HAS(w, SUBSURFACE)) {
-        const real medium = part.subsurface_weight, body = R(1.0) - medium * (R(1.0) - part.base_metalness);
-        pbr_weigh(&part, body, medium);
-        m->body += share * body;
-        m->medium += share * medium;
+INLINE void pbr_add(pbr_mix *m, pbr part, real share) {
+    real *numbers = (real *)&part;
+    const real body = pbr_body(&part);
+    part.base_color = color_scale(part.base_color, body);
+    m->body += share * body;
+    for (int i = 0; i < WEIGHED_PARTS; ++i) {
+        const int first = WEIGHED[i][0];
+        const real weight = LEAST_WEIGHT + numbers[first];
+        for (int n = first + 1; n <= first + WEIGHED[i][1]; ++n) numbers[n] *= weight;
+        m->weights[i] += share * weight;
     }
-    for (int i = 0; i < NUMBERS_OF(pbr); ++i) ((real *)&m->sum)[i] += share * ((const real *)&part)[i];
+    for (int n = 0; n < NUMBERS_OF(pbr); ++n) ((real *)&m->sum)[n] += share * numbers[n];
 }
 
-INLINE pbr pbr_mixed(pbr_mix m, world w) {
-    if (HAS(w, SUBSURFACE)) pbr_weigh(&m.sum, R(1.0) / fmax(m.body, R(1e-6)), R(1.0) / fmax(m.medium, R(1e-6)));
+// (Lanes that have no material at all have no weights.)
+INLINE pbr pbr_mixed(pbr_mix m) {
+    real *numbers = (real *)&m.sum;
+    m.sum.base_color = color_scale(m.sum.base_color, R(1.0) / fmax(m.body, R(1e-6)));
+    for (int i = 0; i < WEIGHED_PARTS; ++i) {
+        const int first = WEIGHED[i][0];
+        const real each = R(1.0) / fmax(m.weights[i], R(1e-6));
+        for (int n = first + 1; n <= first + WEIGHED[i][1]; ++n) numbers[n] *= each;
+    }
     return m.sum;
 }
 
@@ -68,9 +82,9 @@ CALLED pbr pbr_at(stage s, const interaction *here, world w) {
             shares[material->blend[1]] += shares[i] * second;
             continue;
         }
-        pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i], w);
+        pbr_add(&mix, pbr_mapped(s, here, i, w), shares[i]);
     }
-    pbr sum = pbr_mixed(mix, w);
+    pbr sum = pbr_mixed(mix);
     sum.base_weight = sum.emission_luminance = R(1.0);
     return sum;
 }
@@ -98,10 +112,10 @@ INLINE pbr pbr_found(stage s, const interaction *here, world w) {
         one.tint = object_color(here->normal, quantity, one.object, w);
         other.tint = object_color(here->normal, quantity, other.object, w);
         pbr_mix mix = {0};
-        pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share, w);
-        pbr_add(&mix, pbr_at(s, &other, w), here->share, w);
+        pbr_add(&mix, pbr_at(s, &one, w), R(1.0) - here->share);
+        pbr_add(&mix, pbr_at(s, &other, w), here->share);
         // (A blend of one material alone is not that material to the last bit. A single lane that is here has two.)
-        p = LANES == 1 ? pbr_mixed(mix, w) : pbr_pick(flows, pbr_mixed(mix, w), p);
+        p = LANES == 1 ? pbr_mixed(mix) : pbr_pick(flows, pbr_mixed(mix), p);
     }
     if (any_lane(on_face(here))) pbr_of_face(here, &p);
     return p;

@@ -13,6 +13,7 @@ class Coat(Part):
     """A clear layer over the body."""
 
     place = 30
+    counts_by_weight = True
     weight: FractionMap = Field(0.0, description="part of the surface that has it")
     color: ReflectanceMap = Field(WHITE, description="what passes through it, there and back")
     roughness: FractionMap = Field(0.0, description="of its highlight")

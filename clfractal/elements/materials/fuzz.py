@@ -15,6 +15,7 @@ class Fuzz(Part):
     """Short fibres over everything: dust, velvet."""
 
     place = 40
+    counts_by_weight = True
     weight: FractionMap = Field(0.0, description="how dense they are")
     color: ReflectanceMap = Field(WHITE, description="linear Rec. 709")
     roughness: StandMap = Field(

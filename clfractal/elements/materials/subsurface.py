@@ -10,6 +10,7 @@ class Subsurface(Part):
     """A medium below the boundary, in the place of the diffuse body: skin, wax, marble."""
 
     place = 60
+    counts_by_weight = True
     weight: FractionMap = Field(0.0, description="part of the diffuse body that light goes into")
     color: ReflectanceMap = Field(
         (0.8, 0.8, 0.8), description="what comes out of a thick body in all, linear Rec. 709"

@@ -17,6 +17,7 @@ class ThinFilm(Part):
 
     place = 25
     costly = ("weight",)
+    counts_by_weight = True
     weight: FractionMap = Field(0.0, description="part of the surface that has it")
     thickness: Annotated[ThicknessMap, Usual(0, 1)] = Field(
         0.5, description="micrometres; one of several has hardly any colour"

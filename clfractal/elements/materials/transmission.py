@@ -16,6 +16,7 @@ class Transmission(Part):
     """Glass in the place of the diffuse body; its roughness is that of `specular`."""
 
     place = 50
+    counts_by_weight = True
     weight: FractionMap = Field(0.0, description="part of the body that is glass")
     color: ReflectanceMap = Field(
         WHITE,
