@@ -1,8 +1,8 @@
-"""Makes the gallery: docs/pictures/*.webp and docs/gallery.md, from the scenes.
+"""Makes the gallery: docs/pictures/*.webp, docs/gallery.md and docs/figures.md, from the scenes.
 
-    python docs/make_gallery.py             every picture (minutes), then the page
-    python docs/make_gallery.py mandelbox   one picture, then the page
-    python docs/make_gallery.py --page      only the page
+    python docs/make_gallery.py             every picture (minutes), then the pages
+    python docs/make_gallery.py mandelbox   one picture, then the pages
+    python docs/make_gallery.py --page      only the pages
 
 Each scene is rendered at its full size (and denoised, where light bounces), reduced in linear light to WIDTH pixels, and
 written with the highest quality that leaves the file small enough. Pages that show the picture of an earlier format get the
@@ -41,19 +41,32 @@ Floats = npt.NDArray[np.float32]
 
 HEAD = """# Gallery
 
-Every scene in [`scenes/`](../scenes), rendered by this program and reduced. To make one at full size, and to see it
-from the other side:
+The scenes in [`scenes/`](../scenes), rendered by this program and reduced; [figures](figures.md) of the thesis and diagrams
+have a page of their own. To make one at full size, and to see it from the other side:
 
 ```console
 clfractal render scenes/mandelbulb.yaml -o bulb.png
 clfractal render scenes/mandelbulb.yaml -o other_side.png --set 'camera.position=[-1.25, 2.05, 0.85]'
 ```
 
-The words are those of the scene files; `python docs/make_gallery.py` makes the pictures and this page anew.
+The words are those of the scene files; `python docs/make_gallery.py` makes the pictures and both pages anew.
 Times are for that many pixels with the scene's own samples on two processor cores, without the seconds that
 building its program takes when a formula is rendered for the first time. Pictures of scenes in which light bounces are
 denoised here (`--denoise`).
 """
+
+FIGURES_HEAD = """# Figures and diagrams
+
+Scenes after figures of Rickard Englund's thesis *Rendering Methods for 3D Fractals* (2010), and pictures that explain more
+than they please. The others are in the [gallery](gallery.md), which also tells how these are made.
+"""
+# Scenes of that page beside those that are called after a figure.
+DIAGRAMS = ("cut_mandelbrot", "four_views", "hast_normals")
+
+
+def is_figure(scene: Path) -> bool:
+    """Whether a scene belongs to the figures and diagrams."""
+    return scene.stem.startswith("figure") or scene.stem in DIAGRAMS
 
 
 def scene_paths() -> list[Path]:
@@ -89,10 +102,19 @@ def file_of(name: str) -> Path:
     return earlier if earlier.exists() and not now.exists() else now
 
 
-def page() -> str:
-    """The text of docs/gallery.md."""
-    parts = [HEAD]
-    for scene in scene_paths():
+def pages() -> dict[str, str]:
+    """The texts of the pages, by their names."""
+    scenes = scene_paths()
+    return {
+        "gallery.md": page(HEAD, [scene for scene in scenes if not is_figure(scene)]),
+        "figures.md": page(FIGURES_HEAD, [scene for scene in scenes if is_figure(scene)]),
+    }
+
+
+def page(head: str, scenes: Sequence[Path]) -> str:
+    """The text of a page that shows some scenes."""
+    parts = [head]
+    for scene in scenes:
         title, *sentences = comment_of(scene)
         parts.append(f"## {title}\n")
         parts.append(f"![{title}](pictures/{file_of(scene.stem).name})\n")
@@ -205,13 +227,14 @@ def relinked(text: str) -> str:
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Makes the named pictures, or all, and the page."""
+    """Makes the named pictures, or all, and the pages."""
     PICTURES.mkdir(exist_ok=True)
     names = [argument for argument in arguments if argument != "--page"]
     for scene in scene_paths():
         if scene.stem in names or not arguments:
             make_picture(scene)
-    (DOCS / "gallery.md").write_text(page(), "utf-8")
+    for name, text in pages().items():
+        (DOCS / name).write_text(text, "utf-8")
     for other in (DOCS.parent / "README.md", *DOCS.glob("*.md")):
         other.write_text(relinked(other.read_text("utf-8")), "utf-8")
 

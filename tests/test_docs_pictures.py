@@ -85,10 +85,12 @@ def test_pages_show_the_format_that_is_there(
     assert gallery.file_of("never_made").name == "never_made.webp"
 
 
-def test_the_page_is_made_of_the_scenes(gallery: Any) -> None:
-    """Its pictures are there, in one of the formats; those made since the size rule holds follow it."""
-    page = (DOCS / "gallery.md").read_text("utf-8")
+def test_the_pages_are_made_of_the_scenes(gallery: Any) -> None:
+    """Their pictures are there, in one of the formats; those made since the size rule holds follow it."""
+    pages = {name: (DOCS / name).read_text("utf-8") for name in gallery.pages()}
+    assert pages == gallery.pages()
     for scene in gallery.scene_paths():
+        page = pages["figures.md" if gallery.is_figure(scene) else "gallery.md"]
         file = gallery.file_of(scene.stem)
         if file.exists():
             assert f"](pictures/{file.name})" in page
