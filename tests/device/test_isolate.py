@@ -201,6 +201,7 @@ def test_no_process_can_be_started(device: Device, pool: Children, monkeypatch: 
     monkeypatch.undo()
 
 
+@pytest.mark.usefixtures("interrupts_are_not_ignored")
 def test_an_interrupt_ends_the_child_and_frees_its_place(
     device: Device, pool: Children, tmp_path: Path
 ) -> None:
