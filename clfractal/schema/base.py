@@ -119,10 +119,19 @@ class Section(BaseModel, metaclass=_Kind):
         return with_info_plain_validator_function(cls._as_part, metadata={PART: cls})
 
     @classmethod
-    def _as_part(cls, value: Any, info: ValidationInfo) -> Any:
+    def _complete(cls) -> None:
         if not cls.__pydantic_complete__:
             with _MAKING:
                 cls.model_rebuild()
+
+    def __setstate__(self, state: dict[Any, Any]) -> None:
+        """In a process that has made no such section yet: early versions of pydantic write none of an incomplete class."""
+        self._complete()
+        super().__setstate__(state)
+
+    @classmethod
+    def _as_part(cls, value: Any, info: ValidationInfo) -> Any:
+        cls._complete()
         # Where this refuses, pydantic puts the path of this place before the section's own.
         return cls.__pydantic_validator__.validate_python(value, context=info.context)
 

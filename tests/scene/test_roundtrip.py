@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import pickle
+import subprocess
+import sys
 from typing import Any, get_args
 
 import pytest
@@ -303,3 +306,19 @@ def test_a_live_parameter_that_is_none_is_told_with_its_place() -> None:
     with pytest.raises(FormulaError) as caught:
         load_scene(text)
     assert str(caught.value) == "scene:3:18: formula.live.0: unknown parameter 'powre'; did you mean 'power'?"
+
+
+TOLD = "import pickle, sys; print(pickle.load(sys.stdin.buffer).{}.model_dump_json(), end='')"
+
+
+@pytest.mark.parametrize("section", ["coloring", "renderer", "camera"])
+def test_a_scene_from_another_process_is_told_there(section: str) -> None:
+    """One that has made no section of its kind, as a cluster's worker."""
+    scene = load_scene({"version": 1, "formula": {"name": "mandelbulb"}, "camera": {}})
+    ended = subprocess.run(
+        [sys.executable, "-c", TOLD.format(section)],
+        input=pickle.dumps(scene),
+        capture_output=True,
+        check=True,
+    )
+    assert ended.stdout.decode() == getattr(scene, section).model_dump_json()
