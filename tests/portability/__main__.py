@@ -35,7 +35,8 @@ from tests.portability.implementations import (
 )
 from tests.portability.pictures import PARTS
 
-_TIMEOUT_S = 900
+# Of one process: the longest takes nine minutes on two idle cores (`Implementation.minutes`), and more beside other work.
+_TIMEOUT_S = 1500
 _TELLING = threading.Lock()
 
 
