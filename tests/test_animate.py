@@ -132,7 +132,7 @@ def test_a_frame_in_work_keeps_its_tiles(clf: InProcess, monkeypatch: pytest.Mon
 
 
 @pytest.mark.skipif(os.name == "nt", reason="needs SIGKILL")
-def test_killed_at_any_time_it_goes_on(clf: InProcess) -> None:
+def test_killed_twice_in_a_frame_it_goes_on(clf: InProcess) -> None:
     """Frames of 36 tiles, which are kept while a frame is in work; the film is the same as without kills."""
     size = ["--size", "384x384", "--set", "formula.iterations=12", "--samples", "2", "--frames", "0-1"]
     for number in range(2):

@@ -275,7 +275,7 @@ def test_nobody_answers(folder: Path) -> None:
     address = f"127.0.0.1:{free_port()}"
     ended = process(["render", "heavy.yaml", "-o", "out.exr", "--quiet", "--cluster", address], folder)
     assert ended.is_one_line(3, f"tcp://{address}: the scheduler does not answer within 10 s")
-    assert time.monotonic() - start < 10 + 50  # it waits once
+    assert time.monotonic() - start < 10 + 10  # it waits once
     assert not list(folder.glob("out.exr*"))
 
 
