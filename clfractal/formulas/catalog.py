@@ -8,14 +8,16 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from clfractal.errors import FileError, FormulaError, Where, unknown_name
+from clfractal.errors import FormulaError, Where, unknown_name
 from clfractal.files.resources import folder
 from clfractal.formulas.binding import bind, check_radius
-from clfractal.formulas.build import bounds_from_mapping, check_keys, formula_from_mapping
+from clfractal.formulas.build import bounds_from_mapping, formula_from_mapping
 from clfractal.formulas.chain import MAX_COUNT, MAX_LINKS, Chain, Link
 from clfractal.formulas.definition import Formula, inside
 from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.own import check_inside, find_own, library_names
+from clfractal.formulas.include import document_with_included, plain_with_included
+from clfractal.formulas.names import check_keys
+from clfractal.formulas.own import find_own, library_names, safe_path
 from clfractal.formulas.turns import MAX_START
 
 _SOURCES = ("name", "file", "inline", "chain")
@@ -53,7 +55,7 @@ def described(name: str, beside: Path) -> tuple[Mapping[str, Any], Chain]:
     path = find_own(name, beside, Where())
     if path is None:
         return description(name), load_chain(name)
-    return _read(path, str(path))[0], resolve({"name": name}, beside)
+    return _read(path, str(path), beside)[0], resolve({"name": name}, beside)
 
 
 def is_chain(name: str) -> bool:
@@ -170,6 +172,7 @@ class _Resolver:
         if key == "inline":
             if not isinstance(value, Mapping):
                 raise FormulaError("must be a mapping, a formula's keys", here)
+            value = plain_with_included(value, here, folder=self.base_folder, beside=self.beside)
             return value, here, {"inline": value}
         if not isinstance(value, str):
             raise FormulaError("must be text", here)
@@ -177,7 +180,7 @@ class _Resolver:
             return description(value), Where(f"{value}.yaml"), {"name": value}
         if self.base_folder is None:
             raise FormulaError("a formula file needs a scene file, in whose folder it is looked for", here)
-        data, _ = _read(safe_path(value, self.base_folder, here), value)
+        data, _ = _read(safe_path(value, self.base_folder, here), value, self.beside)
         return data, Where(value), {"inline": data}
 
     def _link(
@@ -221,7 +224,7 @@ class _Resolver:
             return formula_from_mapping(data, Where(), name=name)
         except FormulaError as error:
             # Read again, for the line and column that the plain data no longer has.
-            document = _read(self.base_folder / place.file, place.file)[1]
+            document = _read(self.base_folder / place.file, place.file, self.beside)[1]
             raise document.locate(error) from None
 
     def _links(
@@ -306,20 +309,6 @@ def _parsed_once(data: Mapping[str, Any], place: Where, name: str) -> Formula:
     return formula
 
 
-def safe_path(text: str, base_folder: Path, where: Where) -> Path:
-    """The path of a file named in a scene, which must stay inside the scene's folder.
-
-    Raises:
-        FileError: an absolute path, one that leads out of the folder, by `..` or by a link.
-    """
-    path = Path(text)
-    if not text or "\0" in text or path.is_absolute() or ".." in path.parts or path.drive:
-        raise FileError(f"must be a path inside the scene's folder, got {text[:80]!r}", where)
-    full = base_folder / path
-    check_inside(full, base_folder, text[:80], where)
-    return full
-
-
 def _source_key(spec: Mapping[str, Any], where: Where, others: tuple[str, ...]) -> str:
     check_keys(spec, (*_SOURCES, *others), where)
     given = [key for key in _SOURCES if spec.get(key) is not None]
@@ -357,11 +346,15 @@ def _step_scale(data: Mapping[str, Any], place: Where) -> float | None:
     return float(value)
 
 
-def _read(path: Path, shown: str) -> tuple[Mapping[str, Any], Any]:
+def _read(path: Path, shown: str, beside: Path | None = None) -> tuple[Mapping[str, Any], Any]:
     """A YAML file's mapping, and the document that knows where everything in it stands."""
     from clfractal.files.document import read_document, read_text_file
 
     document = read_document(read_text_file(path, name=shown), shown, error=FormulaError)
+    try:
+        document = document_with_included(document, Where(), folder=path.parent, beside=beside)
+    except FormulaError as error:
+        raise document.locate(error) from None
     data = document.plain()
     if not isinstance(data, Mapping):
         raise FormulaError("must be a mapping, a formula's keys", Where(shown))

@@ -10,10 +10,15 @@ from typing import Any
 
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.definition import Add, BoundFormula
+from clfractal.formulas.nodes import Node
 from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64
 MAX_COUNT = 1000
+# Applications until turns that are data repeat themselves.
+MAX_TABLE = 4096
+# An application that no orbit gets to.
+NEVER = 2**31 - 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +77,9 @@ class Chain:
                 raise FormulaError(f"count must be 1 to {MAX_COUNT}, got {link.count}", Where())
             if not 0 <= link.start <= MAX_START or (link.stop is not None and link.stop <= link.start):
                 raise FormulaError(f"start must be 0 to {MAX_START} and below stop", Where())
-        _ = self.spans
+        last = self.spans[-1]
+        if self.turns_are_data and last.begin + last.cycle > MAX_TABLE:
+            raise FormulaError(f"the turns must repeat themselves within {MAX_TABLE} applications", Where())
 
     @cached_property
     def key(self) -> tuple[object, ...]:
@@ -132,8 +139,54 @@ class Chain:
 
     @property
     def repeats_from(self) -> int:
-        """The application from which on the turns repeat themselves, with the period `cycle_length`."""
+        """The application from which on equal z have equal futures, with the period `cycle_length`; it may be `NEVER`."""
+        if self.turns_are_data or self.carried or any(link.bound.formula.numbered for link in self.links):
+            return NEVER
         return self.spans[-1].begin
+
+    @cached_property
+    def structure(self) -> tuple[object, ...]:
+        """What its text depends on beside values of parameters, and beside facts that follow from them."""
+        if not self.turns_are_data:
+            return tuple(link.structure for link in self.links)
+        members = tuple((link.bound.formula, link.bound.add) for link in self.links)
+        return (members, self.first_index, self.shape_index, self.rule_index)
+
+    @property
+    def starts_at_zero(self) -> bool:
+        """Whether iteration starts at z = 0, because f(0) is not a finite number or depends on the point."""
+        return self.add == "point" and self.first.start is None
+
+    @property
+    def period(self) -> int:
+        """A number of applications after which equal z have equal futures, where they ever have."""
+        return 1 if self.repeats_from == NEVER else self.cycle_length
+
+    @cached_property
+    def turns_are_data(self) -> bool:
+        """Whether whose turn it is stands in no text: of chains with members that use the language's later words."""
+        return len(self.links) > 1 and any(link.bound.formula.grown for link in self.links)
+
+    @cached_property
+    def carried(self) -> tuple[str, ...]:
+        """The numbers that are carried beside z: those of one name are one number, whichever members have it."""
+        names = (each.name for link in self.links for each in link.bound.formula.state)
+        return tuple(dict.fromkeys(names))
+
+    def begins(self, name: str) -> tuple[int, Node]:
+        """A carried number's value before the first application: the link that says it, and the expression."""
+        first = self.first_index
+        for index in (first, *range(len(self.links))):
+            for each in self.links[index].bound.formula.state:
+                if each.name == name:
+                    return index, each.start
+        raise KeyError(name)
+
+    @cached_property
+    def table(self) -> tuple[tuple[int, ...], int]:
+        """The links of applications 0, 1, ..., and how many of them at the end come again and again."""
+        last = self.spans[-1]
+        return tuple(self._index_at(n) for n in range(last.begin + last.cycle)), last.cycle
 
     @property
     def cycle_length(self) -> int:
@@ -162,8 +215,16 @@ class Chain:
         return math.exp(min(exponent, 690.0))
 
     @cached_property
+    def rule_index(self) -> int | None:
+        """The number of the link whose `distance` rays march by: the last lasting one's, if all links have one."""
+        ruled = all(link.bound.formula.distance is not None for link in self.links)
+        return self.spans[-1].members[-1] if ruled else None
+
+    @cached_property
     def shape_index(self) -> int | None:
-        """For degree 1: the number of the last lasting link if it has a `shape`, which the last solid then is."""
+        """For degree 1: the number of the last lasting link if its `shape`, or `distance`, tells the last solid."""
+        if self.rule_index is not None:
+            return self.rule_index if self.degree <= 1 else None
         index = self.spans[-1].members[-1]
         has_shape = self.links[index].bound.formula.shape is not None
         return index if has_shape and self.degree <= 1 else None

@@ -11,8 +11,10 @@ from types import MappingProxyType
 from typing import Any, Literal, TypeAlias
 
 from clfractal.errors import FormulaError, Where
-from clfractal.formulas.evaluate import as_function, finite
-from clfractal.formulas.nodes import Call, Node, Number, names_in, substitute, walk
+from clfractal.formulas.blocks import Block, leaves_in, nodes_of, run, turns_in
+from clfractal.formulas.evaluate import as_function, evaluate, finite
+from clfractal.formulas.names import APPLICATION
+from clfractal.formulas.nodes import Call, Node, Number, is_condition, names_in, substitute, walk
 
 # Of functions that are computed in several ways the argument that chooses.
 _CHOOSING = MappingProxyType({"pow": 1, "cpow_re": 2, "cpow_im": 2, "where": 0})
@@ -27,8 +29,9 @@ MAX_REPEAT = 64
 
 
 def point_name(variable: str) -> str:
-    """The name under which a map may use the constant C of a variable (`point_x`)."""
-    return f"point_{variable}"
+    """The name under which a map may use the constant C of a variable (`point_x`; of a vector's numbers `point.x`)."""
+    vector, dot, letter = variable.partition(".")
+    return f"point.{letter}" if dot else f"point_{vector}"
 
 
 def inside(where: Where, *parts: str) -> Where:
@@ -77,6 +80,20 @@ class Parameter:
         return number
 
 
+@dataclass(frozen=True, slots=True)
+class Carried:
+    """A number that applications carry on beside z.
+
+    Attributes:
+        start: its value before the first application, of parameters and of the point's three coordinates.
+        next: its value after an application, beside a `map`; None: it stays as it is, or `do` gives it values.
+    """
+
+    name: str
+    start: Node
+    next: Node | None = None
+
+
 @dataclass(frozen=True, eq=False)
 class Formula:
     """A map of three or four real variables that is iterated, as its file describes it.
@@ -101,6 +118,11 @@ class Formula:
         julia: the constant to add when none is given (only with `add: constant`).
         alone: the set is empty, and no ray asks for it: the formula of scenes of objects alone.
         source: the mapping it was read from, as plain data.
+        state: the numbers that are carried beside z.
+        steps: an application as statements, `let` and `map` among them, where the formula has `state` or `do`; else
+            none, and `let` and `map` tell all.
+        distance: the distance of a point, in scene units, from its last z and its carried numbers.
+        numbered: an application depends on its number `n`.
     """
 
     name: str
@@ -126,6 +148,15 @@ class Formula:
     alone: bool
     source: Mapping[str, Any]
     description: str
+    state: tuple[Carried, ...] = ()
+    steps: Block = ()
+    distance: Node | None = None
+    numbered: bool = False
+
+    @property
+    def grown(self) -> bool:
+        """Whether it has words that change how it is written: what it does depends on more than z, or is in statements."""
+        return bool(self.steps) or self.numbered or self.distance is not None
 
     def parameter(self, name: str) -> Parameter | None:
         """The parameter of that name, or None."""
@@ -151,7 +182,17 @@ class Formula:
             known[name] = leaves(node)
         defaults = {parameter.name: parameter.default for parameter in self.parameters}
         found = set(names_in(self.repeat))
-        for node in (*let.values(), *self.map, *([self.derivative] if self.derivative else [])):
+        if self.steps:
+            own = {*self.variables, *(each.name for each in self.state)}
+            uses = leaves_in(self.steps)
+            known = {name: used - (uses.keys() - own) for name, used in uses.items()}
+            for node in turns_in(self.steps):
+                # Of `on > 0 and n > 3` a part is decided by a parameter alone.
+                for part in walk(node):
+                    if (part is node or is_condition(part)) and leaves(part) <= defaults.keys():
+                        found |= leaves(part)
+        nodes = nodes_of(self.steps) if self.steps else (*let.values(), *self.map)
+        for node in (*nodes, *([self.derivative] if self.derivative else [])):
             for part in walk(node):
                 if isinstance(part, Call) and part.function in _CHOOSING:
                     names = leaves(part.arguments[_CHOOSING[part.function]])
@@ -284,11 +325,13 @@ class BoundFormula:
         if self.formula.point_map:
             return None
         formula = self.formula
+        if formula.steps:
+            return self._start_of_steps()
         let = [(name, formula.function(node)) for name, node in formula.let]
         components = [formula.function(node) for node in formula.map]
         state = (0.0,) * len(formula.variables)
         for _ in range(self.repeat):
-            names = {**self.values, **dict(zip(formula.variables, state, strict=True))}
+            names = {APPLICATION: 0.0, **self.values, **dict(zip(formula.variables, state, strict=True))}
             try:
                 for name, value in let:
                     names[name] = finite(value(names))
@@ -296,6 +339,20 @@ class BoundFormula:
             except FormulaError:
                 return None
         return state
+
+    def _start_of_steps(self) -> tuple[float, ...] | None:
+        """f(0), and behind it the carried numbers as they are then."""
+        formula = self.formula
+        names: dict[str, Any] = {APPLICATION: 0.0, **self.values, **dict.fromkeys(formula.variables, 0.0)}
+        try:
+            for each in formula.state:
+                names[each.name] = float(evaluate(each.start, self.values))
+            run(formula.steps, names)
+            return tuple(
+                finite(names[name]) for name in (*formula.variables, *(each.name for each in formula.state))
+            )
+        except FormulaError:
+            return None  # a number begins with the point's coordinates, or is no number
 
     @property
     def _converted(self) -> bool:

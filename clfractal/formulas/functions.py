@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+
+from clfractal.formulas.fuse import without_unused
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,6 +21,7 @@ class Facts:
         has_calls: of exp, sin and their like.
         carries_orbits: whether a march leaves a packet's last orbits under way: where an application costs much beside a
             step, and is the same however many have been.
+        carried: numbers that go on beside z.
     """
 
     size: int
@@ -27,6 +31,7 @@ class Facts:
     has_shape: bool
     has_calls: bool
     carries_orbits: bool
+    carried: int = 0
 
     def defines(self, **others: object) -> str:
         """As defines, of which some have other values."""
@@ -40,6 +45,8 @@ class Facts:
             "HAS_CALLS": int(self.has_calls),
             "CARRIES_ORBITS": int(self.carries_orbits),
         }
+        if self.carried:
+            values["STATE_CARRIED"] = self.carried
         return "".join(f"#define {name} {value}\n" for name, value in {**values, **others}.items())
 
 
@@ -48,26 +55,40 @@ def each_usual(formulas: int) -> str:
     return f"#define EACH_USUAL(DO) {' '.join(f'DO({which + 1})' for which in range(formulas))}\n"
 
 
-def state_functions(size: int) -> str:
-    """The state of an orbit, by components so that every one can live in a register."""
+def state_functions(size: int, carried: int = 0, over_duals: Mapping[int, str] | None = None) -> str:
+    """The state of an orbit, by components so that every one can live in a register.
+
+    Args:
+        size: numbers of z.
+        carried: numbers beside it.
+        over_duals: those of them that go with z over dual numbers, and their types.
+    """
     fields = [f"s{i}" for i in range(size)]
+    beside = [f"e{i}" for i in range(carried)]
+    over = {f"e{i}": c_type for i, c_type in (over_duals or {}).items()}
 
-    def each(text: str, join: str = ", ") -> str:
-        return join.join(text.replace("@", field) for field in fields)
+    def each(text: str, join: str = ", ", also: str = "") -> str:
+        return join.join([text.replace("@", field) for field in fields] + ([also] if also else []))
 
+    picked = ", ".join(f"pick(m, yes.{field}, no.{field})" for field in beside)
+    picked_over = ", ".join(
+        f"{'dual_where' if c_type == 'dual' else 'pick'}(m, yes.{field}, no.{field})"
+        for field, c_type in over.items()
+    )
+    fields_over = "".join(f"\n    {c_type} {field};" for field, c_type in over.items())
     return f"""\
 typedef struct {{
-    real {", ".join(fields)};
+    real {", ".join([*fields, *beside])};
 }} state;
 typedef struct {{
-    dual {", ".join(fields)};
+    dual {", ".join(fields)};{fields_over}
 }} dual_state;
 INLINE state state_pick(mask m, state yes, state no) {{
-    const state r = {{{each("pick(m, yes.@, no.@)")}}};
+    const state r = {{{each("pick(m, yes.@, no.@)", also=picked)}}};
     return r;
 }}
 INLINE dual_state dual_state_pick(mask m, dual_state yes, dual_state no) {{
-    const dual_state r = {{{each("dual_where(m, yes.@, no.@)")}}};
+    const dual_state r = {{{each("dual_where(m, yes.@, no.@)", also=picked_over)}}};
     return r;
 }}
 INLINE real state_square(state z) {{ return {each("z.@ * z.@", " + ")}; }}
@@ -77,3 +98,14 @@ INLINE vec dual_state_gradient(dual_state z, real factor) {{
     return vec_of({", ".join(each(f"(factor * z.@.v) * z.@.d{axis}", " + ") for axis in "xyz")});
 }}
 """
+
+
+def link_name(prefix: str, index: int, usual: bool) -> str:
+    """The name of a link's function, before that of a leaf."""
+    return f"{prefix}_{'usual' if usual else 'apply'}_{index}"
+
+
+def function_text(head: str, lines: Sequence[str], tail: str | None) -> str:
+    """A function's text: its head, its statements without those that nothing uses, and what it ends with."""
+    body = "".join(f"    {line}\n" for line in lines) + (f"    {tail}\n" if tail else "")
+    return f"{head}\n{without_unused(body)}}}\n"

@@ -84,3 +84,17 @@ def check_inside(path: Path, folder: Path, shown: str, where: Where) -> None:
         raise FileError(f"cannot be read: {shown}", where) from error
     if not real.is_relative_to(base):
         raise FileError(f"leads out of the scene's folder: {shown!r}", where)
+
+
+def safe_path(text: str, base_folder: Path, where: Where) -> Path:
+    """The path of a file named in a scene, which must stay inside the scene's folder.
+
+    Raises:
+        FileError: an absolute path, one that leads out of the folder, by `..` or by a link.
+    """
+    path = Path(text)
+    if not text or "\0" in text or path.is_absolute() or ".." in path.parts or path.drive:
+        raise FileError(f"must be a path inside the scene's folder, got {text[:80]!r}", where)
+    full = base_folder / path
+    check_inside(full, base_folder, text[:80], where)
+    return full

@@ -11,7 +11,7 @@ import math
 import re
 import warnings
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from typing import Any, NoReturn
 
 from clfractal.errors import FormulaError, Where, unknown_name
@@ -25,11 +25,25 @@ from clfractal.formulas.nodes import (
     Number,
     is_condition,
     tree_depth,
+    walk,
+)
+from clfractal.formulas.vectors import (
+    COMPONENTS,
+    VECTOR_FUNCTIONS,
+    Operand,
+    Share,
+    Vector,
+    call_vector,
+    described,
+    each_component,
+    swizzled,
 )
 
 MAX_TEXT = 10_000
 MAX_NODES = 2_000
 MAX_DEPTH = 100
+# Of an expression with vectors written as numbers, and functions of the formula's own written in.
+MAX_EXPANDED = 20_000
 
 _ALLOWED = re.compile(r"[A-Za-z0-9_ .,+\-*/<>=!()]*")
 _BINARY: Mapping[type[ast.operator], str] = {
@@ -50,15 +64,55 @@ _COMPARE: Mapping[type[ast.cmpop], str] = {
 _HINTS: Mapping[type[ast.AST], str] = {
     ast.FloorDiv: "'//' is not part of the language; use floor(x/y)",
     ast.IfExp: "'if' is not part of the language; use where(condition, then, otherwise)",
-    ast.Attribute: "attributes ('.') are not part of the language",
     ast.Tuple: "a single value is needed here, not a list",
 }
 
 
+@dataclass(frozen=True, slots=True)
+class OwnFunction:
+    """A function that a formula defines: its text is read anew wherever it is called.
+
+    Attributes:
+        let: names for parts of its value, in order.
+        names: what its text may use beside its arguments.
+        functions: those that its text may call.
+    """
+
+    name: str
+    arguments: tuple[str, ...]
+    let: tuple[tuple[str, str | int | float], ...]
+    value: str | int | float
+    where: Where
+    names: frozenset[str]
+    functions: Mapping[str, OwnFunction]
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What an expression may use.
+
+    Attributes:
+        known: every name that has a meaning, besides `pi`. `v` is a vector if `v.x`, `v.y` and so on are among them.
+        functions: of the formula's own.
+        share: gives a part that is used several times a name of its own; None: it is written several times.
+        bound: names that stand for what is written already: arguments of a function.
+    """
+
+    known: Collection[str]
+    functions: Mapping[str, OwnFunction] = field(default_factory=dict)
+    share: Share | None = None
+    bound: Mapping[str, Operand] = field(default_factory=dict)
+
+
 def parse(
-    text: str | int | float, *, names: Collection[str], where: Where, parameters_only: bool = False
+    text: str | int | float,
+    *,
+    names: Collection[str] | Names,
+    where: Where,
+    parameters_only: bool = False,
+    condition: bool = False,
 ) -> Node:
-    """The tree of an expression, or of a plain number.
+    """The tree of an expression, or of a plain number; with `condition` of a condition.
 
     Args:
         names: every name that has a meaning in it, besides `pi`.
@@ -70,28 +124,49 @@ def parse(
         number that
             is not finite, or more than MAX_TEXT characters, MAX_NODES nodes or MAX_DEPTH levels.
     """
-    return _Parser(text, names, where, parameters_only).parse()
+    reader = _Parser(text, names, where, parameters_only)
+    value = reader.parse(condition)
+    if isinstance(value, Vector):
+        reader.fail(f"must be a number, not {described(value)}", value.position)
+    return value
+
+
+def parse_operand(text: str | int | float, *, names: Names, where: Where) -> Operand:
+    """The same, of an expression that may be a vector."""
+    return _Parser(text, names, where, parameters_only=False).parse(condition=False)
 
 
 class _Parser:
     """One expression on its way from text to tree."""
 
     def __init__(
-        self, text: str | int | float, names: Collection[str], where: Where, parameters_only: bool
+        self,
+        text: str | int | float,
+        names: Collection[str] | Names,
+        where: Where,
+        parameters_only: bool,
+        expanded: list[int] | None = None,
     ) -> None:
         self.given = text
-        self.names = names
+        known = names if isinstance(names, Names) else Names(names)
+        self.names, self.own, self.bound = known.known, known.functions, known.bound
+        self.share: Share = known.share or (lambda node: node)
         self.where = where
         self.functions = PARAMETER_FUNCTIONS if parameters_only else FUNCTIONS
+        # (Where only parameters are, everything is a number.)
+        self.vectors = {} if parameters_only else VECTOR_FUNCTIONS
         self.text = ""
         self.offset = 0
         self.nodes = 0
-        self._readers: Mapping[type[ast.expr], Callable[[Any, int, int], Node]] = {
+        # What functions have been written in altogether, by whoever calls them.
+        self.expanded = [0] if expanded is None else expanded
+        self._readers: Mapping[type[ast.expr], Callable[[Any, int, int], Operand]] = {
             ast.UnaryOp: self._unary,
             ast.BinOp: self._binary,
             ast.BoolOp: self._boolean,
             ast.Compare: self._compare,
             ast.Call: self._call,
+            ast.Attribute: self._swizzle,
         }
 
     def fail(self, message: str, position: int = 0) -> NoReturn:
@@ -103,21 +178,30 @@ class _Parser:
             replace(self.where, column=position) if self.where.file is None else self.where,
         )
 
-    def parse(self) -> Node:
+    def parse(self, condition: bool) -> Operand:
+        """The tree, or the trees of a vector's components."""
         given = self.given
         if isinstance(given, bool) or not isinstance(given, (int, float, str)):
             self.fail(f"must be an expression or a number, got {_kind(given)}")
-        if not isinstance(given, str):
+        if not isinstance(given, str) and not condition:
             return self._number(given, 0)
+        given = str(given)
         if len(given) > MAX_TEXT:
             self.fail(f"is too long: {len(given):,} characters, at most {MAX_TEXT:,}")
         self.text = re.sub(r"[\t\r\n]", " ", given)
         self._check_characters()
         tree = self._read()
         node = self._node(tree, 1)
-        if is_condition(node):
-            self.fail("must be a number, not a condition", node.position)
-        if tree_depth(node) > MAX_DEPTH:  # min(a, b, ...) and a < b < ... are deeper as trees than as texts
+        parts = node.parts if isinstance(node, Vector) else (node,)
+        if is_condition(parts[0]) != condition:
+            what = (
+                f"a condition, such as x > 0, not {described(node)}"
+                if condition
+                else "a number, not a condition"
+            )
+            self.fail(f"must be {what}", node.position)
+        # min(a, b, ...) and a < b < ... are deeper as trees than as texts
+        if any(tree_depth(part) > MAX_DEPTH for part in parts):
             self.fail(f"nested more than {MAX_DEPTH} levels deep", node.position)
         return node
 
@@ -165,14 +249,14 @@ class _Parser:
         if depth > MAX_DEPTH:
             self.fail(f"nested more than {MAX_DEPTH} levels deep", position)
 
-    def _node(self, tree: ast.expr, depth: int) -> Node:
+    def _node(self, tree: ast.expr, depth: int) -> Operand:
         position = int(getattr(tree, "col_offset", 0)) + self.offset + 1
         self._count(position, depth)
         if isinstance(tree, ast.Constant):
             return self._number(tree.value, position)
         if isinstance(tree, ast.Name):
             return self._name(tree.id, position)
-        read: Callable[[Any, int, int], Node] | None = self._readers.get(type(tree))
+        read: Callable[[Any, int, int], Operand] | None = self._readers.get(type(tree))
         if read is None:
             self.fail(_HINTS.get(type(tree), "is not part of the language"), position)
         return read(tree, position, depth)
@@ -188,29 +272,49 @@ class _Parser:
             self.fail("must be a finite number", position)
         return Number(number, position)
 
-    def _name(self, name: str, position: int) -> Node:
+    def _name(self, name: str, position: int) -> Operand:
         if name == "pi":
             return Number(math.pi, position)
+        if name in self.bound:
+            return self.bound[name]
         if name in self.names:
             return Name(name, position)
-        if name in self.functions:
+        if f"{name}.x" in self.names:
+            parts = (f"{name}.{letter}" for letter in COMPONENTS)
+            return Vector(tuple(Name(part, position) for part in parts if part in self.names), position)
+        if name in self.functions or name in self.own or name in self.vectors:
             self.fail(f"{name!r} is a function and needs its arguments in brackets", position)
-        return self.fail(unknown_name("name", name, {*self.names, "pi"}), position)
+        return self.fail(unknown_name("name", name, {*self.names, *self.bound, "pi"}), position)
 
-    def _value(self, tree: ast.expr, depth: int, user: str) -> Node:
-        """A number for an operator or a function."""
+    def _value(self, tree: ast.expr, depth: int, user: str) -> Operand:
+        """A number, or a vector, for an operator or a function."""
         node = self._node(tree, depth)
-        if is_condition(node):
+        if not isinstance(node, Vector) and is_condition(node):
             self.fail(f"{user} needs a number here, not a condition", node.position)
+        return node
+
+    def _plain(self, tree: ast.expr, depth: int, user: str) -> Node:
+        """A number for what takes no vectors."""
+        node = self._value(tree, depth, user)
+        if isinstance(node, Vector):
+            self.fail(f"{user} needs a number here, not {described(node)}", node.position)
         return node
 
     def _condition(self, tree: ast.expr, depth: int, user: str) -> Node:
         node = self._node(tree, depth)
-        if not is_condition(node):
+        if isinstance(node, Vector) or not is_condition(node):
             self.fail(f"{user} needs a condition here, such as x > 0", node.position)
         return node
 
-    def _unary(self, tree: ast.UnaryOp, position: int, depth: int) -> Node:
+    def _swizzle(self, tree: ast.Attribute, position: int, depth: int) -> Operand:
+        if isinstance(tree.value, ast.Name) and f"{tree.value.id}.{tree.attr}" in self.names:
+            return Name(f"{tree.value.id}.{tree.attr}", position)
+        value = self._value(tree.value, depth + 1, "'.'")
+        if not isinstance(value, Vector):
+            self.fail("attributes ('.') are parts of vectors, and this is a number", position)
+        return swizzled(value, tree.attr, position, self.fail)
+
+    def _unary(self, tree: ast.UnaryOp, position: int, depth: int) -> Operand:
         if isinstance(tree.op, ast.Not):
             return Call("not", (self._condition(tree.operand, depth + 1, "'not'"),), position)
         if isinstance(tree.op, ast.UAdd):
@@ -220,27 +324,28 @@ class _Parser:
         operand = self._value(tree.operand, depth + 1, "'-'")
         if isinstance(operand, Number):
             return Number(-operand.value, position)
-        return Call("neg", (operand,), position)
+        return each_component("neg", (operand,), position, self.fail)
 
-    def _binary(self, tree: ast.BinOp, position: int, depth: int) -> Node:
+    def _binary(self, tree: ast.BinOp, position: int, depth: int) -> Operand:
         function = _BINARY.get(type(tree.op))
         if function is None:
             self.fail(_HINTS.get(type(tree.op), "this operator is not part of the language"), position)
         symbol = {"add": "'+'", "sub": "'-'", "mul": "'*'", "div": "'/'", "pow": "'**'"}[function]
-        node = Call(
-            function,
-            (self._value(tree.left, depth + 1, symbol), self._value(tree.right, depth + 1, symbol)),
-            position,
-        )
-        return self._checked(node)
+        operands = (self._value(tree.left, depth + 1, symbol), self._value(tree.right, depth + 1, symbol))
+        return self._checked(each_component(function, operands, position, self.fail))
 
     def _boolean(self, tree: ast.BoolOp, position: int, depth: int) -> Node:
         operator = "and" if isinstance(tree.op, ast.And) else "or"
         parts = [self._condition(part, depth + 1, f"'{operator}'") for part in tree.values]
         return self._fold(operator, parts, position, depth)
 
-    def _checked(self, node: Call) -> Call:
+    def _checked(self, node: Operand) -> Operand:
         """Refuses a division by a constant zero and an exponent that no number survives."""
+        if isinstance(node, Vector):
+            for part in node.parts:
+                self._checked(part)
+            return node
+        assert isinstance(node, Call)
         last = _constant(node.arguments[-1])
         place = node.arguments[-1].position
         if node.function in ("div", "mod") and last == 0:
@@ -253,7 +358,7 @@ class _Parser:
         return node
 
     def _compare(self, tree: ast.Compare, position: int, depth: int) -> Node:
-        operands = [self._value(part, depth + 1, "a comparison") for part in (tree.left, *tree.comparators)]
+        operands = [self._plain(part, depth + 1, "a comparison") for part in (tree.left, *tree.comparators)]
         parts: list[Node] = []
         for operator, left, right in zip(tree.ops, operands, operands[1:], strict=False):
             function = _COMPARE.get(type(operator))
@@ -270,31 +375,99 @@ class _Parser:
             folded = Call(function, (folded, part), position)
         return folded
 
-    def _call(self, tree: ast.Call, position: int, depth: int) -> Node:
+    def _call(self, tree: ast.Call, position: int, depth: int) -> Operand:
         if not isinstance(tree.func, ast.Name):
             self.fail(_HINTS.get(type(tree.func), "only a function's name can be called"), position)
         function = tree.func.id
-        if function not in self.functions:
-            if function in self.names or function == "pi":
-                self.fail(f"{function!r} is not a function; write '*' to multiply", position)
-            self.fail(unknown_name("function", function, self.functions), position)
+        least, most = self._arities(function, position)
         if tree.keywords or any(isinstance(argument, ast.Starred) for argument in tree.args):
             self.fail(f"{function} takes plain arguments only", position)
-        expected, got = self.functions[function], len(tree.args)
-        several = function in ("min", "max") and got > expected
-        if got != expected and not several:
-            least = "at least " if function in ("min", "max") else ""
-            plural = "s" if expected > 1 else ""
-            self.fail(f"{function} takes {least}{expected} argument{plural}, got {got}", position)
-        read: list[Callable[[ast.expr, int, str], Node]] = [self._value] * got
+        got = len(tree.args)
+        if not least <= got <= most:
+            words = (
+                f"{least}"
+                if least == most
+                else f"at least {least}"
+                if most > MAX_NODES
+                else f"{least} to {most}"
+            )
+            plural = "s" if (least if least == most or most > MAX_NODES else most) > 1 else ""
+            self.fail(f"{function} takes {words} argument{plural}, got {got}", position)
+        if function in self.own:
+            values = [self._value(argument, depth + 1, function) for argument in tree.args]
+            return self._expanded(self.own[function], values, position)
+        if function in self.vectors:
+            values = [self._value(argument, depth + 1, function) for argument in tree.args]
+            return self._limited(call_vector(function, values, position, self.fail, self.share), position)
         if function == "where":
-            read[0] = self._condition
-        arguments = [
-            reader(argument, depth + 1, function) for reader, argument in zip(read, tree.args, strict=True)
-        ]
-        if several:
-            return self._fold(function, arguments, position, depth)
-        return self._checked(Call(function, tuple(arguments), position))
+            condition = self._condition(tree.args[0], depth + 1, function)
+            values = [self._value(argument, depth + 1, function) for argument in tree.args[1:]]
+            return each_component(function, (condition, *values), position, self.fail)
+        read = self._plain if function in ("cpow_re", "cpow_im") else self._value
+        arguments = [read(argument, depth + 1, function) for argument in tree.args]
+        if got > 2 and function in ("min", "max"):
+            self._count(position, depth + got - 2, got - 2)
+            folded = arguments[0]
+            for argument in arguments[1:]:
+                folded = each_component(function, (folded, argument), position, self.fail)
+            return folded
+        return self._checked(each_component(function, arguments, position, self.fail))
+
+    def _arities(self, function: str, position: int) -> tuple[int, int]:
+        """The fewest and the most arguments of a function; an error if there is none of that name."""
+        if function in self.own:
+            arguments = len(self.own[function].arguments)
+            return arguments, arguments
+        if function in self.functions:
+            return self.functions[function], MAX_TEXT if function in ("min", "max") else self.functions[
+                function
+            ]
+        if function in self.vectors:
+            least, most, _ = self.vectors[function]
+            return least, most
+        if function in self.names or function in self.bound or function == "pi":
+            self.fail(f"{function!r} is not a function; write '*' to multiply", position)
+        every = {*self.functions, *self.own, *self.vectors}
+        return self.fail(unknown_name("function", function, every), position)
+
+    def _limited(self, value: Operand, position: int) -> Operand:
+        size = 0
+        for part in value.parts if isinstance(value, Vector) else (value,):
+            for _ in walk(part):
+                size += 1
+                if size > MAX_EXPANDED:
+                    self.fail(
+                        "is too large with its vectors written as numbers: give parts of it names", position
+                    )
+        return value
+
+    def _expanded(self, function: OwnFunction, values: list[Operand], position: int) -> Operand:
+        """A function of the formula's own, written in."""
+        bound = dict(zip(function.arguments, map(self._shared, values), strict=True))
+        for name, text in (*function.let, ("", function.value)):
+            where = inside_function(function, name)
+            names = Names(function.names, function.functions, self.share, bound)
+            reader = _Parser(text, names, where, parameters_only=False, expanded=self.expanded)
+            value = reader.parse(condition=False)
+            self.expanded[0] += reader.nodes
+            if self.expanded[0] > MAX_EXPANDED:
+                self.fail(f"is too large with {function.name!r} written in", position)
+            if name:
+                bound[name] = self._shared(value)
+        return self._limited(value, position)
+
+    def _shared(self, value: Operand) -> Operand:
+        if isinstance(value, Vector):
+            return Vector(tuple(map(self.share, value.parts)), value.position)
+        return self.share(value)
+
+
+def inside_function(function: OwnFunction, name: str) -> Where:
+    """The place of a part of a function's text; without a name of its value."""
+    if not function.let:
+        return function.where
+    parts = ("let", name) if name else ("value",)
+    return replace(function.where, path=".".join((function.where.path or "", *parts)))
 
 
 def _constant(node: Node) -> float | None:

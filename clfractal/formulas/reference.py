@@ -22,9 +22,12 @@ from clfractal.formulas.backends import (
     constant_dual,
     seeded,
 )
+from clfractal.formulas.blocks import run
+from clfractal.formulas.carried import names_at_end
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.definition import BoundFormula, point_name
 from clfractal.formulas.evaluate import Backend, evaluate, evaluate_constant
+from clfractal.formulas.names import APPLICATION
 
 __all__ = [
     "DualBackend",
@@ -46,22 +49,83 @@ Float = NDArray[np.float64]
 EXTRA_APPLICATIONS = 64
 
 
-def apply(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
-    """One application: the map with its repeats, then C (`constant`) added unless nothing is to be."""
+def apply(
+    bound: BoundFormula,
+    state: Sequence[Any],
+    constant: Sequence[Any],
+    backend: Backend,
+    *,
+    number: int = 0,
+    carried: Sequence[str] | None = None,
+) -> list[Any]:
+    """One application: the map with its repeats, then C (`constant`) added unless nothing is to be.
+
+    Args:
+        state: the numbers of z, and behind them those that are carried.
+        number: the application's, from 0.
+        carried: the names of the latter; None: those of the formula.
+    """
     formula = bound.formula
+    size = len(formula.variables)
+    if carried is None:
+        carried = [each.name for each in formula.state]
+    if formula.steps:
+        return _apply_steps(bound, state, constant, backend, number, carried)
     fixed = {name: float(value) for name, value in bound.values.items()}
     names: dict[str, Any] = {
+        APPLICATION: float(number),
         **fixed,
         **{point_name(v): c for v, c in zip(formula.variables, constant, strict=True)},
     }
+    state, beside = list(state[:size]), list(state[size:])
     for _ in range(bound.repeat):
         names.update(zip(formula.variables, state, strict=True))
         for name, node in formula.let:
             names[name] = evaluate(node, names, backend)
         state = [evaluate(node, names, backend) for node in formula.map]
+    return [*_added(bound, state, constant, backend), *beside]
+
+
+def _added(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
     if bound.add == "none":
         return list(state)
     return [backend.call("add", [z, c]) for z, c in zip(state, constant, strict=True)]
+
+
+def _apply_steps(
+    bound: BoundFormula,
+    state: Sequence[Any],
+    constant: Sequence[Any],
+    backend: Backend,
+    number: int,
+    carried: Sequence[str],
+) -> list[Any]:
+    """An application of a formula that is told in statements."""
+    formula = bound.formula
+    own = {each.name for each in formula.state}
+    names: dict[str, Any] = {
+        APPLICATION: float(number),
+        **{name: float(value) for name, value in bound.values.items()},
+        **{point_name(v): c for v, c in zip(formula.variables, constant, strict=True)},
+        **dict(zip(formula.variables, state, strict=False)),
+    }
+    beside = dict(zip(carried, state[len(formula.variables) :], strict=True))
+    names.update({name: value for name, value in beside.items() if name in own})
+    run(formula.steps, names, backend)
+    z = _added(bound, [names[name] for name in formula.variables], constant, backend)
+    return [*z, *(names[name] if name in own else value for name, value in beside.items())]
+
+
+def carried_at_start(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:
+    """The numbers that go on beside z, before the first application."""
+    found = []
+    for name in chain.carried:
+        index, node = chain.begins(name)
+        bound = chain.links[index].bound
+        values = {name: float(value) for name, value in bound.values.items()}
+        values.update(zip(bound.formula.variables[:3], point, strict=False))
+        found.append(evaluate(node, values, backend))
+    return found
 
 
 def space_to_state(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:
@@ -90,22 +154,26 @@ def escape(
     """
     radius = chain.bailout if bailout is None else bailout
     backend = NumpyBackend()
+    size = chain.size
     with np.errstate(all="ignore"):
         state, point = start(chain, points, backend)
         count = np.zeros(len(points), dtype=np.int64)
-        alive = _norm(state) <= radius
+        alive = _norm(state[:size]) <= radius
         for application in range(iterations):
             index = np.flatnonzero(alive)
             if not len(index):
                 break
             bound = chain.link_at(application).bound
             here = [p[index] for p in point]
-            new = apply(bound, [z[index] for z in state], constant_of(bound, here), backend)
+            before = [z[index] for z in state]
+            new = apply(
+                bound, before, constant_of(bound, here), backend, number=application, carried=chain.carried
+            )
             for component, value in zip(state, new, strict=True):
                 component[index] = value
             count[index] += 1
             # A NaN is no small number: such a point has escaped.
-            alive[index] = _norm([z[index] for z in state]) <= radius
+            alive[index] = _norm([z[index] for z in state[:size]]) <= radius
     return count, alive
 
 
@@ -125,17 +193,13 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     """
     backend = DualBackend(NumpyBackend())
     with np.errstate(all="ignore"):
-        state, shown, count, inside = _dual_orbit(chain, points, iterations, backend)
+        last, shown, count, inside = _dual_orbit(chain, points, iterations, backend)
+        state, shown = last[: chain.size], shown[: chain.size]
         radius = _norm([z.value for z in state])
         growth = np.linalg.norm(_gradient(state, radius), axis=1)
         gradient = _gradient(shown, _norm([z.value for z in shown]))
         if chain.shape_index is not None:
-            bound = chain.links[chain.shape_index].bound
-            names = {**bound.values, **dict(zip(bound.formula.variables, state, strict=True))}
-            for name, node in bound.formula.let:
-                names[name] = evaluate(node, names, backend)
-            assert bound.formula.shape is not None
-            solid = constant_dual(evaluate(bound.formula.shape, names, backend), 3)
+            solid = constant_dual(_solid(chain, chain.shape_index, last, backend), 3)
             gradient = np.stack([np.broadcast_to(p, radius.shape) for p in solid.partials], axis=1)
             inside = solid.value <= 0
             growth = np.linalg.norm(gradient, axis=1)
@@ -154,12 +218,43 @@ def distance(chain: Chain, points: Float, iterations: int) -> tuple[Float, Float
     return result, gradient
 
 
+def own_distance(chain: Chain, points: Float, iterations: int) -> Float:
+    """The distance that the formulas tell themselves (`distance`), in scene units; 0 inside."""
+    assert chain.rule_index is not None
+    backend = NumpyBackend()
+    with np.errstate(all="ignore"):
+        dual = DualBackend(backend)
+        last, _, _, inside = _dual_orbit(chain, points, iterations, dual)
+        result = np.asarray(_solid(chain, chain.rule_index, [z.value for z in last], backend), float)
+        if chain.degree <= 1:
+            inside = result <= 0
+        return np.where(inside | ~(result > 0), 0.0, np.broadcast_to(result, inside.shape))
+
+
+def _solid(chain: Chain, index: int, last: Sequence[Any], backend: Backend) -> Any:
+    """A link's `distance`, or its `shape`, of the last state."""
+    bound = chain.links[index].bound
+    formula = bound.formula
+    names: dict[str, Any] = {name: float(value) for name, value in bound.values.items()}
+    names.update(zip(chain.carried, last[chain.size :], strict=True))
+    names.update(zip(formula.variables, last, strict=False))
+    node = formula.shape if chain.rule_index is None else formula.distance
+    assert node is not None
+    needed = names_at_end(formula, node)
+    for name, each in formula.let:
+        if name in needed:
+            names[name] = evaluate(each, names, backend)
+    return evaluate(node, names, backend)
+
+
 def start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], list[Float]]:
     """The state before the first application and the point as a state."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
     raw = space_to_state(chain, list(columns), backend)
     point = [np.array(np.broadcast_to(p, columns[0].shape), dtype=float) for p in raw]
     state = [np.zeros_like(p) if chain.add == "point" else p.copy() for p in point]
+    beside = carried_at_start(chain, point, backend)
+    state += [np.array(np.broadcast_to(each, columns[0].shape), dtype=float) for each in beside]
     return state, point
 
 
@@ -181,16 +276,18 @@ def _dual_orbit(
     point = [_full(p, shape) for p in space_to_state(chain, seeded(list(columns)), backend)]
     zero = _full(0.0, shape)
     state = [zero] * chain.size if chain.add == "point" else list(point)
+    state += [_full(each, shape) for each in carried_at_start(chain, point, backend)]
+    size = chain.size
     count = np.zeros(shape, dtype=np.int64)
     inside = np.zeros(shape, dtype=bool)
-    alive = _norm([z.value for z in state]) <= chain.distance_bailout
+    alive = _norm([z.value for z in state[:size]]) <= chain.distance_bailout
     # For degree 1 the distance is good at any |z|; going on would measure a smaller solid.
     extra = EXTRA_APPLICATIONS if chain.degree > 1 else 1
     shown = state
     for application in range(iterations + extra):
         if application >= iterations:
             # Only points that have left the bailout go on.
-            in_set = alive & (_norm([z.value for z in state]) <= chain.bailout)
+            in_set = alive & (_norm([z.value for z in state[:size]]) <= chain.bailout)
             if application == iterations:
                 inside = in_set
             alive &= ~in_set & (chain.degree > 1)
@@ -199,10 +296,11 @@ def _dual_orbit(
         if not alive.any():
             break
         bound = chain.link_at(application).bound
-        new = apply(bound, state, constant_of(bound, point), backend)
+        constant = constant_of(bound, point)
+        new = apply(bound, state, constant, backend, number=application, carried=chain.carried)
         state = [_select(alive, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
         count += alive
-        alive = alive & (_norm([z.value for z in state]) <= chain.distance_bailout)
+        alive = alive & (_norm([z.value for z in state[:size]]) <= chain.distance_bailout)
     return state, shown, count, inside
 
 
@@ -240,7 +338,7 @@ def mp_escape(chain: Chain, point: Sequence[Any], iterations: int, digits: int =
         limit = mpmath.mpf(chain.bailout) ** 2
         states = _mp_states(chain, map(mpmath.mpf, point), MpmathBackend(), mpmath.mpf)
         for application, state in enumerate(islice(states, iterations + 1)):
-            if not mpmath.fsum(z * z for z in state) <= limit:
+            if not mpmath.fsum(z * z for z in state[: chain.size]) <= limit:
                 return application, False
     return iterations, True
 
@@ -260,12 +358,14 @@ def _mp_states(
 ) -> Iterator[list[Any]]:
     """The states after 0, 1, ... applications, without end; `number` makes a constant one of theirs."""
     c = [number(p) for p in space_to_state(chain, list(point), backend)]
-    state = [number(0.0)] * chain.size if chain.add == "point" else c
+    state = [number(0.0)] * chain.size if chain.add == "point" else list(c)
+    state += [number(each) for each in carried_at_start(chain, c, backend)]
     for application in count():
         yield state
         bound = chain.link_at(application).bound
         constant = [number(p) for p in constant_of(bound, c)]
-        state = [number(z) for z in apply(bound, state, constant, backend)]
+        new = apply(bound, state, constant, backend, number=application, carried=chain.carried)
+        state = [number(z) for z in new]
 
 
 def _mp_dual(value: Any) -> Dual:

@@ -50,14 +50,14 @@ class Together:
 def write_together(chains: tuple[Chain, ...]) -> Together:
     """The text of all; the scalar rules of their own are in it if all have one."""
     scalar_rule = all(write_formula(chain).has_derivative for chain in chains)
-    width = max(chain.size for chain in chains)
+    width, carried = max(chain.size for chain in chains), max(len(chain.carried) for chain in chains)
     leaves: list[FormulaText] = []
     found: list[FormulaText] = []
     firsts: list[int] = []
     constants: list[float] = []
     for chain in chains:
         for number in range(len(leaves) + 1):
-            leaf = Leaf(_name(number), width)
+            leaf = Leaf(_name(number), width, carried)
             written = write_formula(chain, scalar_rule=scalar_rule, leaf=leaf)
             if number == len(leaves):
                 leaves.append(written)
@@ -71,7 +71,7 @@ def write_together(chains: tuple[Chain, ...]) -> Together:
     text = "\n".join(
         [
             _facts([leaf.facts for leaf in leaves]),
-            state_functions(width),
+            state_functions(width, carried, dict.fromkeys(range(carried), "dual")),
             *(leaf.text for leaf in leaves),
             _usual(len(leaves)),
             *(_choice(len(leaves), *each) for each in asked),

@@ -105,3 +105,16 @@ def _span(members: Sequence[Member], active: list[bool], begin: int, end: int | 
     numbers = tuple(index for index, takes_part in enumerate(active) if takes_part)
     # Past the last member that takes part the first one's turn comes.
     return Span(begin, end, ((offset or 0) - begin) % local, local, numbers, tuple(skipped))
+
+
+def turn_lines(spans: Sequence[Span]) -> list[str]:
+    """`turn`: the place that application `n` has in the turns of all links."""
+    if len(spans) == 1:
+        return [f"const int turn = n % {spans[0].cycle};"]
+    lines = ["int turn;"]
+    for span in spans:
+        condition = f"if (n < {span.end}) " if span.end is not None else ""
+        lines.append(f"{'} else ' if span is not spans[0] else ''}{condition}{{")
+        lines.append(f"    turn = (n + {span.offset}) % {span.cycle};")
+        lines += [f"    if (turn >= {first}) turn += {count};" for first, count in span.skipped]
+    return [*lines, "}"]

@@ -13,8 +13,9 @@ from clfractal.device.tune import accepted_lanes
 from clfractal.formulas import catalog
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.opencl import FormulaText, write_formula
-from clfractal.formulas.reference import space_to_state
+from clfractal.formulas.reference import carried_at_start, space_to_state
 from tests.devices import device
+from tests.formulas.grown import GROWN
 from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
 from tests.small_kernels import LOADS, Floats, SmallKernels
 
@@ -60,6 +61,7 @@ SPECS: dict[str, Any] = {
         "inline": {**UNUSUAL, "map": ["x*x + point_y", "y*point_x - z", "z*z", "w*point_z"]},
         "julia": [0.3, -0.2, 0.6, 0.1],
     },
+    **GROWN,
 }
 
 # The states of every step, over real and dual numbers, and the scalar derivative.
@@ -160,4 +162,5 @@ def orbit(name: str, form: str, precision: Precision) -> Orbit:
 
 def start_at(chain: Chain, columns: list[Any], backend: Any) -> tuple[list[Any], list[Any]]:
     point = list(space_to_state(chain, columns, backend))
-    return ([np.zeros_like(point[0].value)] * chain.size if chain.add == "point" else point), point
+    z = [np.zeros_like(point[0].value)] * chain.size if chain.add == "point" else list(point)
+    return [*z, *carried_at_start(chain, point, backend)], point
