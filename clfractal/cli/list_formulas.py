@@ -9,10 +9,12 @@ from typing import Any
 
 from clfractal.errors import ClfractalError
 from clfractal.formulas import catalog
+from clfractal.formulas.jumps import jumps_of
 from clfractal.formulas.language import Formula, Parameter
 from clfractal.formulas.own import own_files
 
 _WIDTH = 100
+_MOST_JUMPS = 8
 
 
 def list_formulas() -> str:
@@ -112,9 +114,12 @@ def tell_formula(name: str) -> str:
 
 def _formula(formula: Formula) -> list[str]:
     each = "".join(f"\n  {_parameter(parameter)}" for parameter in formula.parameters)
+    jumps = jumps_of(formula)[:_MOST_JUMPS] if formula.grown else ()
     return [
         f"variables: {', '.join(formula.variables)}; adds: {formula.add}",
+        *([f"carries: {', '.join(number.name for number in formula.state)}"] if formula.state else []),
         f"parameters:{each or ' none'}",
+        *([f"no slope where this changes: {', '.join(jumps)}"] if jumps else []),
     ]
 
 

@@ -62,6 +62,39 @@ def scenes(
 
 
 @command
+def import_(
+    context: typer.Context,
+    source: Annotated[
+        str, typer.Argument(metavar="FILE", help="A settings file of Mandelbulber 2 (.fract).")
+    ],
+    output: Annotated[
+        Path | None,
+        typer.Option("-o", "--output", metavar="SCENE", help="The scene file.  [default: FILE.yaml, here]"),
+    ] = None,
+    look: Annotated[
+        str,
+        typer.Option(
+            "--look", metavar="LOOK", help="same: light and colours as there; ours: light along paths."
+        ),
+    ] = "same",
+    formulas: Annotated[
+        Path | None,
+        typer.Option(
+            "--formulas",
+            metavar="FOLDER",
+            help="Where the texts of its formulas are.  [default: where it is installed]",
+        ),
+    ] = None,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> Work:
+    """Make a scene of a settings file of Mandelbulber 2, and tell what of it was not taken over."""
+    from clfractal.cli.import_scene import import_scene
+
+    return lambda: import_scene(source, output, look, formulas, context.obj)
+
+
+@command
 def new(
     context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="NAME", help="The file to write; .yaml may be left out.")],

@@ -106,9 +106,12 @@ Verbose = Annotated[
 
 
 def command(function: Callable[..., Work]) -> Callable[..., Work]:
-    """Makes a function a command of its name; its options say how much the shell tells, which is `context.obj`."""
+    """Makes a function a command of its name; its options say how much the shell tells, which is `context.obj`.
 
-    @app.command()
+    A name that is a word of Python has `_` behind it.
+    """
+
+    @app.command(function.__name__.rstrip("_"))
     @wraps(function)
     def read(**given: Any) -> Work:
         shell: Shell = given["context"].obj

@@ -39,6 +39,7 @@ _ORDER = (
     "watch",
     "scenes",
     "new",
+    "import",
     "vary",
     "find",
     "slices",

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from clfractal.cli.engines import drivers_ahead, engine_of, shares_of
+from clfractal.cli.import_scene import tell_left
 from clfractal.cli.order import Order as Order
 from clfractal.cli.order import naming_options
 from clfractal.cli.pipes import STREAM, is_stream, piped
@@ -64,6 +65,7 @@ def render_files(order: Order, shell: Shell) -> None:
     drivers_ahead(order)
     check_outputs(order, scene, region)
     tell_reference(order, scene, shell)
+    tell_left(order.scene, shell)
     with engine_of(order, shell) as engine:
         _render(order, shell, engine, scene, region, start)
 

@@ -9,9 +9,8 @@ from typing import Literal
 
 from clfractal.files.regular import read_bytes
 
-Kind = Literal["exr", "png", "photo", "volume"]
+Kind = Literal["exr", "png", "photo", "volume", "settings"]
 
-_LONGEST = 12
 _PICTURES: dict[Kind, tuple[str, ...]] = {
     "exr": (".exr",),
     "png": (".png",),
@@ -20,6 +19,7 @@ _PICTURES: dict[Kind, tuple[str, ...]] = {
 _BY_ENDING: dict[str, Kind] = {
     **{ending: kind for kind, endings in _PICTURES.items() for ending in endings},
     **dict.fromkeys((".nrrd", ".nhdr", ".npy"), "volume"),
+    ".fract": "settings",
 }
 _BEGINNINGS: dict[bytes, Kind] = {
     b"\x76\x2f\x31\x01": "exr",
@@ -27,11 +27,13 @@ _BEGINNINGS: dict[bytes, Kind] = {
     b"\xff\xd8\xff": "photo",
     b"NRRD000": "volume",
     b"\x93NUMPY": "volume",
+    b"# Mandelbulber settings file": "settings",
 }
+_LONGEST = max(map(len, _BEGINNINGS))
 
 
 def kind_of(path: Path) -> Kind | None:
-    """The kind of a file; None for all that is neither a picture that may hold a scene nor a volume, such as scenes.
+    """The kind of a file; None for all that is no picture that may hold a scene, no volume, no settings, such as scenes.
 
     An empty or damaged file is of the kind that its name says: so whoever reads this kind tells what is wrong with it. But
     a scene may have any name, also that of a picture, if it is text.

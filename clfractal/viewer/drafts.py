@@ -10,7 +10,7 @@ from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
 from clfractal.errors import ClfractalError
 from clfractal.scene.light_paths import DirectLighting, PathLighting
-from clfractal.scene.lighting import MAX_LIGHTS
+from clfractal.scene.lighting import MAX_ASKED
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.viewer.pacing import Pacing
@@ -25,7 +25,8 @@ _CLOSED = 1e6
 def draft(scene: Scene) -> Scene:
     """The scene as a modelling program shades it: by its lights alone, without shadows, fog and blur.
 
-    Where an environment lights it, a light at the eye takes its place: rays to a sky are noise in a coarse picture.
+    Where an environment lights it, or many lamps, a light at the eye takes their place: rays to a sky are noise in a coarse
+    picture, and a ray to each lamp takes too long.
     Materials keep their colours; what mirrors, breaks or scatters light looks dull. Other scenes stay as they are.
     """
     if not isinstance(scene.lighting, PathLighting):
@@ -41,7 +42,9 @@ def draft(scene: Scene) -> Scene:
     try:
         if environment is not None and environment.rays > 0:
             update["environment"] = environment.model_copy(update={"rays": 0})
-            lights = (_headlight(scene), *lights[: MAX_LIGHTS - 1])
+            lights = (_headlight(scene), *lights)
+        if len(lights) > MAX_ASKED:
+            lights = (_headlight(scene),)
         if isinstance(camera, PerspectiveCamera) and camera.f_number is not None:
             update["camera"] = camera.model_copy(update={"f_number": _CLOSED})
         return scene.model_copy(update={**update, "lights": lights})

@@ -16,7 +16,7 @@ from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.files.atomic import atomic_writer
 from clfractal.files.document import read_document
 from clfractal.files.regular import read_bytes, read_text_file
-from clfractal.formulas.catalog import safe_path
+from clfractal.formulas.own import safe_path
 from clfractal.scene.layout import LayoutView
 from clfractal.scene.lighting import Environment
 from clfractal.scene.model import Scene

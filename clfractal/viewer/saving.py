@@ -90,7 +90,7 @@ def _check_target(source: SceneSource, present: Scene, target: Path, even_if_cha
     if is_own(target):
         raise FileError("comes with the program and is never overwritten; choose another name", where)
     if is_picture(target):
-        raise FileError("is a picture and is never overwritten; choose another name", where)
+        raise FileError("is no scene file and is never overwritten; choose another name", where)
     named = [*formula_files(source.formula, source.folder), *data_files(present)]
     folders = {source.folder, present.folder}
     if any(same_file(folder / name, target) for folder in folders for name in named):

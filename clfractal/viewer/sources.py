@@ -13,6 +13,7 @@ from typing import Any, Literal
 from clfractal.errors import ClfractalError, FileError, SceneError
 from clfractal.files import embedded
 from clfractal.files.document import read_document
+from clfractal.files.file_kinds import kind_of
 from clfractal.files.inputs import noting
 from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene, read_text
@@ -113,7 +114,10 @@ def open_source(path: str | Path) -> SceneSource:
 
 
 def is_protected(path: Path) -> bool:
-    """Whether a file must never be overwritten: it comes with the program, or is a picture; links are followed."""
+    """Whether a file must never be overwritten: it comes with the program, is a picture, or another program's settings.
+
+    Links are followed.
+    """
     return is_own(path) or is_picture(path)
 
 
@@ -129,9 +133,12 @@ def suggested_name(source: SceneSource, folder: Path) -> Path:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a file is a picture of a format that may hold a scene, by its content."""
+    """Whether a file is a picture of a format that may hold a scene, or the settings of another program, by its content.
+
+    A scene is read from it, and never saved into it.
+    """
     try:
-        return embedded.is_picture(path)
+        return embedded.is_picture(path) or kind_of(path) == "settings"
     except FileError:
         return False
 

@@ -111,6 +111,11 @@ def test_a_plane_names_the_objects_that_it_cuts() -> None:
     (plane,) = ui.studio.scene.cut_planes
     assert (plane.cuts_set, plane.cut_objects) == (False, ("box",))
     assert not ui.studio.edit({"cut_planes.0.objects": ["water"]})
+    # Along paths its faces have one of the materials.
+    assert ui.studio.edit({"lighting": {"mode": "path"}, "materials": {"gold": {}}})
+    Stage(ui, scene_dock.draw, window=False)
+    assert ui.studio.edit({"cut_planes.0.material": "gold"})
+    Stage(ui, scene_dock.draw, window=False)
 
 
 def test_a_formula_beside_the_set_is_edited() -> None:

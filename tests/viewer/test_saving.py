@@ -24,6 +24,7 @@ from clfractal.viewer.saving import (
     suggested_name,
 )
 from tests.environment_maps import write_map
+from tests.exchange.files import settings
 from tests.viewer.scene_files import FORMULA, SCENE, SCENES, with_camera
 
 
@@ -51,6 +52,22 @@ def test_comments_formula_file_and_order_stay(desk: Path) -> None:
     assert (saved.kind, saved.path) == ("scene", desk / "scene.yaml")
     assert (desk / "own.yaml").read_text() == FORMULA
     assert sorted(path.name for path in desk.iterdir()) == ["own.yaml", "scene.yaml"]
+
+
+def test_settings_of_another_program_are_opened_and_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "bulb.fract"
+    path.write_text(settings("N 9;\nnever_seen 1;"), encoding="utf-8")
+    source, loaded = opened(path)
+    assert source.kind == "picture"
+    assert "# line 6: never_seen = 1 is not taken over" in source.text
+    assert is_protected(path)
+    assert suggested_name(source, tmp_path) == tmp_path / "bulb-2.yaml"
+    with pytest.raises(FileError, match=r"bulb\.fract"):
+        save_scene(source, with_camera(loaded, fov=35.5), path)
+    saved = save_scene(source, with_camera(loaded, fov=35.5), tmp_path / "bulb-2.yaml")
+    assert load_scene(tmp_path / "bulb-2.yaml") == saved.loaded
+    assert "never_seen" in saved.text
+    assert path.read_text(encoding="utf-8") == settings("N 9;\nnever_seen 1;")
 
 
 def test_an_edited_formula_is_written_into_the_scene(desk: Path) -> None:

@@ -9,11 +9,12 @@ from imgui_bundle import imgui_ctx
 
 from clfractal.scene.checks import MAX_PLANES
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.rectangle import Axis, Plane, scaled
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.schema.shape import Solid
 from clfractal.viewer import plane_moves
-from clfractal.viewer.panels import palette_editor, renderer, theme
+from clfractal.viewer.panels import maps, palette_editor, renderer, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
@@ -103,6 +104,8 @@ def _cut_plane(ui: Ui, index: int) -> None:
         if isinstance(ui.studio.scene.renderer, SurfaceRenderer):
             w.field(ui, f"{path}.set", "Cut the set")
         _named(ui, f"{path}.objects", plane.objects)
+        if isinstance(ui.studio.scene.lighting, PathLighting):
+            maps.choice(ui, f"{path}.material", plane.material, "Matt", None)
     inside = {"start": plane.opacity, "auto": "as opacity"}
     names, count = ("opacity", "inside_opacity", "count"), {"label": "Parallel planes"}
     w.fields(ui, path, names, inside_opacity=inside, count=count)

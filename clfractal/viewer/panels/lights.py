@@ -6,7 +6,8 @@ from typing import Any
 
 from imgui_bundle import imgui
 
-from clfractal.scene.lighting import MAX_LIGHTS
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import MAX_ASKED, MAX_LIGHTS
 from clfractal.schema.kinds import members
 from clfractal.schema.light import LightBase, SmallLight
 from clfractal.schema.trap import Trap
@@ -54,7 +55,8 @@ def _line(index: int, light: Any, chosen: bool) -> bool:
 
 def _buttons(ui: Ui) -> None:
     lights = [w.plain(light) for light in ui.studio.scene.lights]
-    room = len(lights) < MAX_LIGHTS
+    along_paths = isinstance(ui.studio.scene.lighting, PathLighting)
+    room = len(lights) < (MAX_LIGHTS if along_paths else MAX_ASKED)
     w.in_labels()
     if w.button("Add a light", icon=theme.PLUS, enabled=room, about="Add a light where it is seen"):
         imgui.open_popup("##lights")

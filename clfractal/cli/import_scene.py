@@ -1,0 +1,65 @@
+"""`clfractal import`: a scene file of another program's settings, and a line for all that it leaves out."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from clfractal.cli.shell import Shell
+from clfractal.errors import ClfractalError, FileError, Where, unknown_name
+from clfractal.exchange.look import LOOKS
+from clfractal.files.atomic import atomic_writer, check_output
+from clfractal.files.file_kinds import kind_of
+from clfractal.files.inputs import refuse_overwriting
+
+EXTENSIONS = (".yaml", ".yml")
+
+
+def import_scene(source: str, output: Path | None, look: str, formulas: Path | None, shell: Shell) -> None:
+    """Writes the scene of a settings file, which was checked as every scene is.
+
+    Args:
+        output: the scene file; None: one of the same name in the current folder, which is not there yet.
+        look: one of LOOKS.
+        formulas: the folder with the texts of formulas; None: where the program is installed.
+
+    Raises:
+        ClfractalError: the file cannot be read or is none, has what has no counterpart, or the scene cannot be written.
+    """
+    # Here, as other commands do not need it.
+    from clfractal.exchange.mandelbulber import import_settings
+    from clfractal.scene.load import load_scene
+
+    if look not in LOOKS:
+        raise FileError(unknown_name("look", look, LOOKS), Where("--look"))
+    path = output or Path(Path(source).stem + EXTENSIONS[0])
+    check_output(path, EXTENSIONS)
+    if output is None and os.path.lexists(path):
+        raise FileError("exists already and is not replaced; name another file by -o", Where(str(path)))
+    refuse_overwriting([path], [source])
+    found = import_settings(Path(source), next(each for each in LOOKS if each == look), formulas)
+    try:
+        load_scene(found.scene)
+    except ClfractalError as error:
+        raise type(error)(error.message, Where(source, path=error.where.path)) from error
+    with atomic_writer(path) as beside:
+        beside.write_text(found.text(Path(source).name), encoding="utf-8")
+    for line in (*found.origins, *found.remarks):
+        shell.say(f"{source}: {line}")
+    shell.say(f"{path}: {_counted(len(found.remarks))} not taken over")
+
+
+def tell_left(source: str, shell: Shell) -> None:
+    """Says how much of a settings file that is used as a scene was not taken over."""
+    path = Path(source)
+    if path.suffix.lower() != ".fract" and not (path.is_file() and kind_of(path) == "settings"):
+        return
+    from clfractal.exchange.mandelbulber import import_settings
+
+    count = len(import_settings(path).remarks)
+    if count:
+        shell.say(f"{source}: {_counted(count)} not taken over; `clfractal import` tells what")
+
+
+def _counted(count: int) -> str:
+    return "1 thing is" if count == 1 else f"{count} things are"

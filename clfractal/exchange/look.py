@@ -1,0 +1,276 @@
+"""Light, colours, background, fog and limits of a settings file.
+
+Their colours and intensities are what a screen shows; ours are amounts of light, which a screen shows by sRGB's curve. A
+colour becomes that of the same look on a screen, an intensity the one that makes a white surface facing it look the same.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any, Literal
+
+from clfractal.exchange.settings import Section, Settings
+
+Look = Literal["same", "ours"]
+LOOKS: tuple[Look, ...] = ("same", "ours")
+
+_CURVE = 2.2
+"""About the exponent of sRGB's curve, for what may be above 1."""
+_LAMPS = 4
+_LAMP_FACTOR = 100 / 24
+"""What arrives of a lamp of intensity 1 at a distance of 1."""
+_LARGEST = 1e6
+_BLUE, _WHITE, _GREEN = (0x0000, 0x95A2, 0xFFFF), (0xFFFF, 0xFFFF, 0xFFFF), (0x0000, 0x2710, 0x01F4)
+
+
+def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: list[str]) -> dict[str, Any]:
+    """All sections but those of the formula, the camera and the picture's size.
+
+    Raises:
+        FileError: a value is none of its kind.
+    """
+    main = settings.main
+    lights = [*_main_light(main, camera), *_lamps(main, camera)]
+    material = _material(main, lights, remarks)
+    found: dict[str, Any] = {
+        "lights": lights,
+        "material": material,
+        "background": _background(main, camera, remarks),
+        "renderer": {"samples": 4},
+    }
+    if "f_number" in camera:
+        found["renderer"]["samples"] = 16
+    if material.get("reflection", 0) > 0:
+        found["renderer"]["bounces"] = min(max(main.whole("reflections_max", 5), 0), 16)
+    if _occlusion(main) > 0:
+        found["renderer"]["ambient_occlusion"] = {"rays": 4}
+    for key, section in (
+        ("fog", _fog(main)),
+        ("glow", _glow(main)),
+        ("objects", _limits(main)),
+        ("output", _output(main, remarks)),
+    ):
+        if section:
+            found[key] = section
+    if look == "ours":
+        _lit_by_ours(found)
+    return found
+
+
+def decoded(color: Sequence[float]) -> list[float]:
+    """A colour of a screen, 0 to 1, as linear light: sRGB's curve."""
+    return [
+        round(each / 12.92 if each <= 0.04045 else ((each + 0.055) / 1.055) ** 2.4, 6)
+        for each in (min(max(part, 0.0), 1.0) for part in color)
+    ]
+
+
+def _amount(value: float) -> float:
+    """An amount of light on their screen, which may be above 1, as one of ours."""
+    return float(f"{min(max(value, 0.0) ** _CURVE, _LARGEST):.6g}")
+
+
+def _main_light(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
+    alpha, beta = (
+        math.radians(main.number(f"main_light_{name}", default))
+        for name, default in (("alpha", -45), ("beta", 45))
+    )
+    intensity = main.number("main_light_intensity", 1.0)
+    color = main.color("main_light_colour", _WHITE)
+    relative = main.flag("main_light_position_relative", True)
+    shadow = main.flag("shadows_enabled", True)
+    if not main.flag("main_light_enable", True) or intensity <= 0:
+        return []
+    # Where it comes from: alpha is the angle round, 0 behind the camera; beta the angle up.
+    x, y, z = math.sin(alpha) * math.cos(beta), -math.cos(alpha) * math.cos(beta), math.sin(beta)
+    if relative:
+        right, forward, up = _axes(camera)
+        x, y, z = (x * right[i] + y * forward[i] + z * up[i] for i in range(3))
+    light: dict[str, Any] = {
+        "direction": [round(-each, 9) + 0.0 for each in (x, y, z)],
+        "color": decoded(color),
+        "intensity": _amount(intensity),
+    }
+    if not shadow:
+        light["shadow"] = False
+    angle = main.number("shadows_cone_angle", 1.0)
+    if main.flag("MC_soft_shadows_enable", False) and angle > 0:
+        light |= {"angular_size": min(2 * angle, 170.0), "rays": 4}
+    return [light]
+
+
+def _lamps(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
+    """Lamps at points. Light weakens with the square of the distance; on their screen it does so in code values."""
+    found = []
+    whole = main.number("aux_light_intensity", 1.0)
+    defaults = ((1.3, (3, -3, 3)), (1.0, (-3, -3, 0)), (3.0, (-3, 3, -1)), (2.0, (0, -1, -3)))
+    for name in ("main_light", *(f"aux_light_{number}" for number in range(1, _LAMPS + 1))):
+        kind, _, ending = name.partition("light")
+        if not main.flag(f"{kind}light_volumetric_enabled{ending}", False):
+            main.without([f"{kind}light_volumetric_intensity{ending}"])
+    main.without(main.beginning("aux_light_visibility", "main_light_visibility"))
+    for number, (intensity, place) in zip(range(1, _LAMPS + 1), defaults, strict=True):
+        strength = main.number(f"aux_light_intensity_{number}", intensity) * whole
+        position = main.vector(f"aux_light_position_{number}", place)
+        color = main.color(f"aux_light_colour_{number}", _WHITE)
+        if not main.flag(f"aux_light_enabled_{number}", False) or strength <= 0:
+            continue
+        away = max(math.dist(position, camera["target"]), 1e-6)
+        arriving = min(_LAMP_FACTOR * strength / away**2, 10.0)
+        found.append(
+            {
+                "type": "point",
+                "position": list(position),
+                "falloff": "inverse_square",
+                "color": decoded(color),
+                "intensity": float(f"{min(_amount(arriving) * away**2, _LARGEST):.6g}"),
+            }
+        )
+    return found
+
+
+def _axes(camera: dict[str, Any]) -> tuple[list[float], list[float], list[float]]:
+    """Right, forward and up of the picture, each of length 1."""
+    forward = _unit([a - b for a, b in zip(camera["target"], camera["position"], strict=True)])
+    right = _unit(_cross(forward, camera["up"]))
+    return right, forward, _cross(right, forward)
+
+
+def _cross(a: Sequence[float], b: Sequence[float]) -> list[float]:
+    return [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+
+
+def _unit(vector: Sequence[float]) -> list[float]:
+    length = math.hypot(*vector)
+    return [each / length for each in vector]
+
+
+class _Surface:
+    """The first material. Until version 2.08 its keys stood without `mat1_` before them."""
+
+    def __init__(self, main: Section) -> None:
+        self.main = main
+
+    def key(self, name: str) -> str:
+        new = f"mat1_{name}"
+        return name if new not in self.main.entries and name in self.main.entries else new
+
+
+def _occlusion(main: Section) -> float:
+    enabled = main.flag("ambient_occlusion_enabled", False)
+    main.without(("ambient_occlusion_quality", "ambient_occlusion_mode", "ambient_occlusion_fast_tune"))
+    return main.number("ambient_occlusion", 1.0) if enabled else 0.0
+
+
+def _material(main: Section, lights: list[dict[str, Any]], remarks: list[str]) -> dict[str, Any]:
+    surface = _Surface(main)
+    color = main.color(surface.key("surface_color"), (0xC350, 0xC350, 0xC350))
+    specular = main.number(surface.key("specular"), 1.0)
+    width = max(main.number(surface.key("specular_width"), 0.05), 1e-3)
+    everywhere = max(main.color("fill_light_color", (0, 0, 0))) + _occlusion(main)
+    brightest = sum(light["intensity"] for light in lights if light.get("type") != "point")
+    found: dict[str, Any] = {
+        "color": decoded(color),
+        "ambient": float(f"{_amount(everywhere * 0.5) / max(brightest, 0.05):.6g}") if everywhere else 0,
+        "diffuse": 1,
+        "specular": round(min(max(specular, 0.0), 1.0) * 0.5, 6),
+        # Theirs is a power of the cosine with the half vector, which is about the fourth of Phong's exponent.
+        "shininess": round(min(max(30 / width / 4, 1.0), 10_000.0), 6),
+    }
+    if not main.flag("raytraced_reflections", False):
+        main.without((surface.key("reflectance"), "reflections_max", "reflect"))
+    else:
+        found["reflection"] = round(min(max(main.number(surface.key("reflectance"), 0.0), 0.0), 1.0), 6)
+    if main.number(surface.key("transparency_of_surface"), 0.0) > 0:
+        remarks.append("mat1_transparency_of_surface: the surface is not made of glass")
+    return found
+
+
+def _background(main: Section, camera: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
+    """Their colours follow how far a ray points up; ours go from the top of the picture to its bottom."""
+    first, second, third = (
+        main.color(f"background_color_{number}", default)
+        for number, default in ((1, _BLUE), (2, _WHITE), (3, _GREEN))
+    )
+    bright = main.number("background_brightness", 1.0)
+    three = main.flag("background_3_colors_enable", True)
+    if main.flag("textured_background", False):
+        remarks.append("textured_background: the picture behind the set is not taken over")
+
+    def seen(up: float) -> list[float]:
+        if three:
+            part, ends = abs(up), (second, first if up >= 0 else third)
+        else:
+            part, ends = (up + 1) / 2, (second, first)
+        return decoded([bright * (a * (1 - part) + b * part) for a, b in zip(*ends, strict=True)])
+
+    _, forward, top = _axes(camera)
+    half = math.tan(math.radians(camera["fov"] / 2))
+    above, below = (
+        _unit([f + sign * half * t for f, t in zip(forward, top, strict=True)]) for sign in (1, -1)
+    )
+    return {"top": seen(above[2]), "bottom": seen(below[2])}
+
+
+def _fog(main: Section) -> dict[str, Any] | None:
+    color = main.color("basic_fog_color", (0xE807, 0xEF12, 0xFFFF))
+    visibility = main.number("basic_fog_visibility", 20.0)
+    if not main.flag("volumetric_fog_enabled", False):
+        main.without((*main.beginning("volumetric_fog_"), "fog_color_1", "fog_color_2", "fog_color_3"))
+    if not main.flag("iteration_fog_enable", False):
+        main.without(main.beginning("iteration_fog_"))
+    if not main.flag("basic_fog_enabled", False) or visibility <= 0:
+        return None
+    return {"color": decoded(color), "density": float(f"{min(1 / visibility, _LARGEST):.6g}")}
+
+
+def _glow(main: Section) -> dict[str, Any] | None:
+    """Theirs grows with the steps of a ray, up to its own colour and no further; ours with how near it passes."""
+    outer = main.color("glow_color_2", (0xDF68, 0xEDD8, 0xF3C8))
+    main.color("glow_color_1", (0xA018, 0xAEA9, 0xC152))
+    intensity = main.number("glow_intensity", 0.2)
+    if not main.flag("glow_enabled", True) or intensity <= 0:
+        return None
+    return {"color": decoded(outer), "intensity": _amount(min(intensity, 1.0))}
+
+
+def _limits(main: Section) -> dict[str, Any] | None:
+    """A box that the set is cut to."""
+    low, high = main.vector("limit_min", (-10, -10, -10)), main.vector("limit_max", (10, 10, 10))
+    if not main.flag("limits_enabled", False) or any(a >= b for a, b in zip(low, high, strict=True)):
+        return None
+    return {
+        "limits": {
+            "type": "box",
+            "position": [(a + b) / 2 for a, b in zip(low, high, strict=True)],
+            "size": [b - a for a, b in zip(low, high, strict=True)],
+            "join": "intersection",
+        }
+    }
+
+
+def _output(main: Section, remarks: list[str]) -> dict[str, Any]:
+    found: dict[str, Any] = {}
+    bright = main.number("brightness", 1.0)
+    if bright > 0 and bright != 1:
+        found["exposure"] = round(min(max(math.log2(bright) * _CURVE, -20), 20), 6)
+    if main.flag("hdr", False):
+        found["tone"] = "reinhard"
+    for key in ("gamma", "contrast", "saturation"):
+        if abs(main.number(key, 1.0) - 1) > 0.05:
+            remarks.append(f"{key}: {main.number(key, 1.0):g} is not taken over")
+    return found
+
+
+def _lit_by_ours(found: dict[str, Any]) -> None:
+    """Light along paths, of the sun and a sky, in place of theirs."""
+    found["lighting"] = {"mode": "path", "bounces": 6}
+    found["lights"] = [
+        {**light, "angular_size": 3} if light.get("type") != "point" else light for light in found["lights"]
+    ]
+    found["environment"] = {"name": "overcast", "background": False}
+    found["material"] |= {"ambient": 0, "diffuse": 1, "specular": 0, "reflection": 0}
+    found["renderer"] = {"samples": 64}
+    found["output"] = {**found.get("output", {}), "tone": "agx"}
+    found.pop("glow", None)

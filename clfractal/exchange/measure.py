@@ -1,0 +1,122 @@
+"""What our language wants to know of a formula made of a text: how fast it grows, and where its set is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from clfractal.exchange.settings import Settings
+
+DIRECTIONS = 400
+NEAREST, FARTHEST, STEP = 0.05, 120.0, 1.12
+LOOKED_AT = 12
+"""Applications after which a place is taken to be inside."""
+GONE = 1000.0
+LEAST = 2.1
+"""Of sets of powers: the needles of the Mandelbrot set are thin, and reach -2."""
+
+
+def measured(links: Sequence[dict[str, Any]], iterations: int, settings: Settings) -> dict[str, Any]:
+    """The section `formula` of a scene, of members with `formula`, `count`, `start` and `stop`."""
+    import numpy as np
+
+    generator = np.random.default_rng(1)
+    directions = generator.normal(size=(DIRECTIONS, 3))
+    # Thin parts lie along axes, and diagonals of planes and cubes, rather than anywhere.
+    straight = np.array(
+        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z]
+    )
+    directions = np.concatenate([straight, directions]).astype(float)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    done: dict[int, dict[str, Any]] = {}
+    for link in links:
+        if id(link["formula"]) not in done:
+            done[id(link["formula"])] = {**link["formula"], "degree": _degree(link["formula"], directions)}
+    members = [{**link, "formula": done[id(link["formula"])]} for link in links]
+    shapes = any("distance" in formula for formula in done.values())
+    radius = FARTHEST if shapes else _radius(members, directions, min(iterations, LOOKED_AT))
+    if any(formula["degree"] >= 2 for formula in done.values()):
+        radius = max(radius, LEAST)
+    main = settings.main
+    # Nothing is seen farther out than they look.
+    seen = float(np.linalg.norm(main.vector("camera", (3, -6, 2)))) + max(
+        main.number("view_distance_max", 50.0), 0.1
+    )
+    radius = float(f"{min(radius, max(seen, 0.1), 1e6):.4g}")
+    # Shapes are there whatever becomes of z.
+    bailout = 1e9 if shapes else float(f"{max(4.0, 3 * radius):.4g}")
+    shared = {"bounds": {"center": [0, 0, 0], "radius": radius}, "bailout": bailout}
+    for formula in done.values():
+        formula |= {"bounds": {"radius": radius}, "bailout": bailout}
+        if shapes:
+            formula |= {"degree": 1, "distance_bailout": bailout}
+    if len(members) == 1 and "stop" not in members[0]:
+        return {"inline": members[0]["formula"], "iterations": iterations}
+    chain = [_member(each) for each in members]
+    return {"inline": {"title": "Hybrid", "chain": chain, **shared}, "iterations": iterations}
+
+
+def are_inside(section: dict[str, Any], points: Sequence[Sequence[float]]) -> list[bool]:
+    """Whether points are in the set of a scene's section `formula`."""
+    import numpy as np
+
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import escape
+
+    with np.errstate(all="ignore"):
+        _, inside = escape(resolve(section), np.array(points, float), int(section["iterations"]))
+    return [bool(each) for each in inside]
+
+
+def _member(link: dict[str, Any]) -> dict[str, Any]:
+    return {
+        "inline": link["formula"],
+        **{key: link[key] for key in ("count", "start", "stop") if key in link},
+    }
+
+
+def _degree(formula: dict[str, Any], directions: Any) -> float:
+    """The power by which |z| grows far outside, in the middle of many directions."""
+    import numpy as np
+
+    from clfractal.formulas.backends import NumpyBackend
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import apply
+
+    bound = resolve({"inline": formula}).links[0].bound
+    lengths = []
+    for size in (1e5, 1e6):
+        axes = len(formula["variables"])
+        z = [*(size * directions.T), *([np.zeros(len(directions))] if axes == 4 else [])]
+        carried = [np.ones(len(directions)) for _ in formula.get("state", ())]
+        with np.errstate(all="ignore"):
+            found = apply(bound, [*z, *carried], [0.0 * part for part in z], NumpyBackend())[:axes]
+            lengths.append(np.sqrt(sum(np.broadcast_to(part, len(directions)) ** 2 for part in found)))
+    with np.errstate(all="ignore"):
+        slopes = np.log10(lengths[1] / lengths[0])
+    slopes = slopes[np.isfinite(slopes)]
+    middle = float(np.median(slopes)) if len(slopes) else 1.0
+    whole = round(middle)
+    near = float(whole) if abs(middle - whole) < 0.1 else round(middle, 2)
+    return min(max(near, 1.0), 64.0)
+
+
+def _radius(members: Sequence[dict[str, Any]], directions: Any, applications: int) -> float:
+    """The radius of a ball around the origin that has all places which are still near after some applications."""
+    import numpy as np
+
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import escape
+
+    last = max((link.get("stop", 0) for link in members), default=0)
+    chain = resolve({"inline": {"chain": [_member(each) for each in members], "bailout": GONE}})
+    count = round(np.log(FARTHEST / NEAREST) / np.log(STEP))
+    radii = NEAREST * STEP ** np.arange(count)
+    points = (radii[:, None, None] * directions[None, :70]).reshape(-1, 3)
+    with np.errstate(all="ignore"):
+        _, inside = escape(chain, points, min(max(applications, last + 2), 40))
+    kept = inside.reshape(count, -1).any(axis=1)
+    if not kept.any():
+        return 4.0
+    largest = float(radii[np.nonzero(kept)[0].max()])
+    return max(1.4 * largest, 0.5)

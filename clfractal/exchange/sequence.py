@@ -1,0 +1,409 @@
+"""Which formulas of a settings file are applied, how often, and what is added: a scene's section `formula`.
+
+Theirs begin at the point and apply the first formula to it. Ours that add the point begin at 0, and the first application
+gives the point; so they have one application more. Where that is not the same, a member that does nothing comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from clfractal.errors import FileError, Where
+from clfractal.exchange.counterparts import counterpart
+from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
+from clfractal.exchange.measure import measured
+from clfractal.exchange.settings import SLOTS, Section, Settings
+from clfractal.exchange.translate import NO_FOLDS, Folds, KeepsError, Space
+from clfractal.exchange.translated import Addition, Following, NeedsFourError, Text, text_of
+from clfractal.exchange.view import is_mirrored
+
+MOST_ITERATIONS = 1_000_000
+MOST_LINKS = 63
+FOLLOWED = 260
+"""Applications that are followed one by one; those after them are as the last ones."""
+_NEVER = 250
+"""`formula_stop_iteration` of a formula that goes on to the end; a file may have more iterations."""
+_TRANSFORMS = 1000
+_SHAPES = range(600, 800)
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """A formula of a file, and its turns: from `start` to `stop`, both included."""
+
+    slot: int
+    number: int
+    adds: bool
+    count: int
+    start: int
+    stop: int
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What all formulas of a file have in common."""
+
+    settings: Settings
+    most: int
+    julia: tuple[float, ...] | None
+    factors: tuple[float, ...]
+    w: float
+    mirrored: bool
+    folds: Folds
+    installed: Installed | None
+    remarks: list[str]
+
+    def addition(self, slot: Slot) -> Addition:
+        """What is added after a formula."""
+        if not slot.adds:
+            return Addition()
+        swapped = slot.number in ADD_SWAPPED
+        if self.julia is None:
+            return Addition(factors=self.factors, swapped=swapped)
+        return Addition(constant=self.julia, swapped=swapped)
+
+
+def formula_of(settings: Settings, installed: Installed | None, remarks: list[str]) -> dict[str, Any]:
+    """The section `formula` of a scene.
+
+    Args:
+        installed: where texts of formulas are read; None: there are none.
+
+    Raises:
+        FileError: a formula has no counterpart, at its line; or a value is none of its kind.
+    """
+    main = settings.main
+    joined = main.flag("boolean_operators", False)
+    hybrid = main.flag("hybrid_fractal_enable", False) and not joined
+    used = _used(settings, hybrid, joined)
+    slots = [_slot(settings, slot, remarks) for slot in used]
+    if hybrid:
+        _note_weights(settings, slots, remarks)
+    if joined:
+        _note_places(settings, 1, remarks, ("position", "rotation", "repeat"))
+        if main.number("formula_scale_1", 1.0) != 1:
+            remarks.append("formula_scale_1: the first formula keeps its own size")
+    plan = _plan(settings, "_1" if joined else "", installed, remarks)
+    section = _by_library(plan, slots[0]) if len(slots) == 1 else None
+    if section is None:
+        section = _by_texts(plan, slots, main.whole("repeat_from", 1))
+    if not joined:
+        _without_others(settings)
+    return section
+
+
+def joined_of(settings: Settings, installed: Installed | None, remarks: list[str]) -> dict[str, Any]:
+    """The other formulas of a file that joins them, as objects of a scene; those that have no counterpart are told.
+
+    Raises:
+        FileError: a value is none of its kind.
+    """
+    main = settings.main
+    found: dict[str, Any] = {}
+    if not main.flag("boolean_operators", False):
+        return found
+    for slot in range(2, SLOTS + 1):
+        if main.whole(f"formula_{slot}", 0) == 0:
+            main.without(main.beginning(f"formula_scale_{slot}", f"formula_position_{slot}"))
+            continue
+        joins = _JOINS.get(main.whole(f"boolean_operator_{slot - 1}", 1), "union")
+        try:
+            plan = _plan(settings, f"_{slot}", installed, remarks)
+            one = _slot(settings, slot, remarks)
+            section = _by_library(plan, one) or _by_texts(plan, [one], 1)
+        except FileError as error:
+            remarks.append(str(error).removeprefix(f"{settings.file}:"))
+            continue
+        size = max(main.number(f"formula_scale_{slot}", 1.0), 1e-6)
+        _note_places(settings, slot, remarks, ("rotation", "repeat"))
+        position = list(main.vector(f"formula_position_{slot}"))
+        placed = {
+            "type": "formula",
+            "formula": section,
+            "position": position,
+            "scale": 1 / size,
+            "join": joins,
+        }
+        found[f"formula {slot}"] = placed
+    _without_others(settings)
+    return found
+
+
+_JOINS = {0: "intersection", 1: "union", 2: "cut"}
+
+
+def _plan(settings: Settings, suffix: str, installed: Installed | None, remarks: list[str]) -> Plan:
+    """What holds for all formulas, or with a suffix for one of them."""
+    main = settings.main
+    factors = main.vector(f"fractal_constant_factor{suffix}", (1, 1, 1))
+    constant = main.vector(f"julia_c{suffix}")
+    julia = tuple(c * f for c, f in zip(constant, factors, strict=True))
+    wanted = main.flag(f"julia_mode{suffix}", False)
+    most = min(max(main.whole("N", 250), 1), MOST_ITERATIONS)
+    w = main.number(f"initial_waxis{suffix}", 0.0)
+    return Plan(
+        settings,
+        most,
+        julia if wanted else None,
+        factors,
+        w,
+        is_mirrored(settings),
+        _folds(main),
+        installed,
+        remarks,
+    )
+
+
+def _folds(main: Section) -> Folds:
+    """What is done to z before each application."""
+    box = (main.number("box_folding_limit", 1.0), main.number("box_folding_value", 2.0))
+    ball = (main.number("spherical_folding_inner", 0.5), main.number("spherical_folding_outer", 1.0))
+    return Folds(
+        box if main.flag("box_folding", False) else None,
+        ball if main.flag("spherical_folding", False) else None,
+    )
+
+
+def _note_places(settings: Settings, slot: int, remarks: list[str], parts: Sequence[str]) -> None:
+    for part in parts:
+        key = f"formula_{part}_{slot}"
+        if any(settings.main.vector(key)):
+            remarks.append(f"{key}: is not taken over")
+
+
+def _without_others(settings: Settings) -> None:
+    """What nobody asked for belongs to other formulas."""
+    for slot in range(1, SLOTS + 1):
+        settings.fractal(slot).without(settings.fractal(slot).entries)
+
+
+def _used(settings: Settings, hybrid: bool, joined: bool) -> list[int]:
+    """The numbers of the slots that have a turn."""
+    main = settings.main
+    if joined:
+        return [1]
+    if not hybrid:
+        main.without(key for key in main.beginning("formula_") if not key.endswith("_1"))
+        main.without((*main.beginning("fractal_enable_"), *main.beginning("formula_i", "formula_st")))
+        return [1]
+    numbers = [slot for slot in range(1, SLOTS + 1) if main.flag(f"fractal_enable_{slot}", True)]
+    used = [slot for slot in numbers if main.whole(f"formula_{slot}", 2 if slot == 1 else 0) != 0]
+    for slot in set(range(1, SLOTS + 1)) - set(used):
+        main.without(key for key in main.beginning("formula_") if key.endswith(f"_{slot}"))
+    if not used:
+        raise FileError("has no formula: all are 0 or not enabled", Where(settings.file))
+    return used
+
+
+def _slot(settings: Settings, slot: int, remarks: list[str]) -> Slot:
+    main = settings.main
+    key = f"formula_{slot}"
+    number = main.whole(key, 2 if slot == 1 else 0)
+    if number <= 0:
+        raise FileError("no formula is chosen", main.where(key))
+    adds = not (number in ADD_NOTHING or number >= _TRANSFORMS or number in _SHAPES)
+    if main.flag(f"dont_add_c_constant_{slot}", False):
+        adds = not adds
+    if not main.flag(f"check_for_bailout_{slot}", True):
+        remarks.append(f"check_for_bailout_{slot}: every application is compared with the bailout")
+    return Slot(
+        slot,
+        number,
+        adds and number not in ADD_THEMSELVES,
+        max(main.whole(f"formula_iterations_{slot}", 1), 1),
+        max(main.whole(f"formula_start_iteration_{slot}", 0), 0),
+        main.whole(f"formula_stop_iteration_{slot}", _NEVER),
+    )
+
+
+def _note_weights(settings: Settings, slots: Sequence[Slot], remarks: list[str]) -> None:
+    for slot in slots:
+        key = f"formula_weight_{slot.slot}"
+        weight = settings.main.number(key, 1.0)
+        if weight != 1:
+            remarks.append(f"{key}: its map is not blended with z by {weight:g}")
+
+
+def _by_library(plan: Plan, slot: Slot) -> dict[str, Any] | None:
+    """A formula alone that our library has; None if it has not."""
+    found = counterpart(slot.number, plan.settings.fractal(slot.slot))
+    if plan.folds != NO_FOLDS:
+        return None
+    if isinstance(found, str) or (plan.w and found.four) or (plan.mirrored and not found.even):
+        return None
+    own = slot.number in ADD_THEMSELVES
+    julia = None if own else plan.julia
+    if found.adds and not slot.adds and not own:
+        julia = (0.0, 0.0, 0.0)
+    if slot.adds and (not found.adds or (julia is None and plan.factors != (1, 1, 1))):
+        return None
+    more = 1 if found.adds and julia is None else 0
+    section: dict[str, Any] = {**found.source, "iterations": min(plan.most + more, MOST_ITERATIONS)}
+    if found.adds and julia is not None:
+        x, y, z = julia
+        section["julia"] = [x, y, -z if plan.mirrored else z, 0.0][: 4 if found.four else 3]
+    return section
+
+
+def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
+    """Formulas by their texts, as a chain."""
+    texts = {slot.slot: _text(plan, slot) for slot in slots}
+    order = turns(slots, repeat, min(plan.most, FOLLOWED))
+    followed, following = _all_followed(plan, slots, texts, order)
+    size = len(followed[0]["variables"])
+    links = _links(followed)
+    if links is None:
+        # Applications differ too often to be formulas of their own: one formula has their number, and what changes.
+        shift = int(any(each["add"] == "point" for each in followed))
+        followed, following = _all_followed(plan, slots, texts, order, following.changed, shift)
+        links = _links(followed)
+    if links is None:
+        where = plan.settings.main.where(f"formula_{slots[0].slot}")
+        raise FileError("applications differ too often for a chain of formulas", where)
+    standing = any(each["add"] == "point" for each in followed)
+    if standing:
+        links = [
+            _standing(size, following.carrying({})),
+            *({**link, "start": link["start"] + 1, **_later(link)} for link in links),
+        ]
+    if size == 4 and plan.w:
+        for link in links:
+            link["formula"] = {**link["formula"], "slice": {"w": plan.w}}
+    plan.settings.origins.extend(_origins(slots, texts))
+    return measured(links, plan.most + standing, plan.settings)
+
+
+def _all_followed(
+    plan: Plan,
+    slots: Sequence[Slot],
+    texts: dict[int, Text],
+    order: Sequence[int],
+    carried: tuple[str, ...] = (),
+    shift: int | None = None,
+) -> tuple[list[dict[str, Any]], Following]:
+    """The formula of each application: of three numbers, if that is enough, and with what has to be carried."""
+    first = texts[slots[0].slot].parameters
+    four = plan.w != 0
+    while True:
+        following = Following(Space(four=four, mirrored=plan.mirrored), first, carried, shift, plan.folds)
+        try:
+            return _followed(plan, slots, texts, order, following), following
+        except NeedsFourError:
+            four = True
+        except KeepsError as error:
+            if error.name in carried:
+                raise
+            # Distances to shapes are divided by how much space was enlarged.
+            carried = (*carried, *((error.name, "DE") if error.name == "dist" else (error.name,)))
+
+
+def _later(link: dict[str, Any]) -> dict[str, int]:
+    return {"stop": link["stop"] + 1} if "stop" in link else {}
+
+
+def _text(plan: Plan, slot: Slot) -> Text:
+    fractal = plan.settings.fractal(slot.slot)
+    where = plan.settings.main.where(f"formula_{slot.slot}")
+    found = text_of(slot.number, fractal, plan.installed)
+    if found is None:
+        reason = counterpart(slot.number, fractal)
+        why = reason if isinstance(reason, str) else "our library has it, but not with what is added here"
+        how = (
+            "no installed Mandelbulber 2 has its text" if plan.installed is None else "its text is not there"
+        )
+        raise FileError(f"formula {slot.number} has no counterpart: {why}; and {how}", where)
+    return found
+
+
+def _followed(
+    plan: Plan, slots: Sequence[Slot], texts: dict[int, Text], order: Sequence[int], following: Following
+) -> list[dict[str, Any]]:
+    """The formula of each application."""
+    by_number = {slot.slot: slot for slot in slots}
+    found = []
+    for application, number in enumerate(order):
+        formula = following.applied(texts[number], application, plan.addition(by_number[number]))
+        if plan.julia is not None and formula["add"] == "point":
+            where = plan.settings.main.where("julia_mode")
+            raise FileError(f"formula {by_number[number].number} asks for the point in a Julia set", where)
+        found.append(formula)
+    return found
+
+
+def _origins(slots: Sequence[Slot], texts: dict[int, Text]) -> list[str]:
+    return [f"formula_{slot.slot}, {slot.number}, is made of {texts[slot.slot].file}" for slot in slots]
+
+
+def turns(slots: Sequence[Slot], repeat: int, count: int) -> list[int]:
+    """Whose turn it is in each of `count` applications, as they have it: the slots' numbers."""
+    found: list[int] = []
+    again = next((place for place, slot in enumerate(slots) if slot.slot >= repeat), 0)
+    place = done = 0
+
+    def following(now: int) -> int:
+        return now + 1 if now + 1 < len(slots) else again
+
+    for application in range(count):
+        done += 1
+        for _ in range(SLOTS):
+            if slots[place].start <= application <= slots[place].stop:
+                break
+            place = following(place)
+        found.append(slots[place].slot)
+        if done >= slots[place].count:
+            done, place = 0, following(place)
+    return found
+
+
+def _links(followed: Sequence[dict[str, Any]]) -> list[dict[str, Any]] | None:
+    """Members of a chain that have these turns; None if they would be too many.
+
+    The end of the applications that are followed repeats for ever: the shortest part that does.
+    """
+    keys = [id(formula) for formula in followed]
+    for period in range(1, min(MOST_LINKS, len(keys)) + 1):
+        begin = len(keys) - period
+        while begin > 0 and keys[begin - 1] == keys[begin - 1 + period]:
+            begin -= 1
+        found = [
+            *_runs(0, begin, keys, followed, stop=True),
+            *_runs(begin, begin + period, keys, followed, stop=False),
+        ]
+        repeats = begin + 2 * period <= len(keys) or begin + period >= len(keys)
+        if len(found) <= MOST_LINKS and repeats:
+            return found
+    return None
+
+
+def _runs(
+    begin: int, end: int, keys: Sequence[int], followed: Sequence[dict[str, Any]], *, stop: bool
+) -> list[dict[str, Any]]:
+    """Members for the applications from `begin` to `end`: each run of one formula, which stops after it or comes again."""
+    found: list[dict[str, Any]] = []
+    place = begin
+    while place < end:
+        last = place
+        while last < end and keys[last] == keys[place]:
+            last += 1
+        start = place if stop else begin
+        link: dict[str, Any] = {"formula": followed[place], "count": last - place, "start": start}
+        found.append({**link, "stop": last} if stop else link)
+        place = last
+    return found
+
+
+def _standing(size: int, carrying: dict[str, Any]) -> dict[str, Any]:
+    """A formula that leaves z where it is, for one application: so an orbit begins at the point."""
+    names = ["x", "y", "z", "w"][:size]
+    formula = {
+        "title": "The point",
+        "variables": names,
+        "map": names,
+        "add": "none",
+        "degree": 1,
+        "bounds": {"radius": 0.001},
+        **(carrying or {"derivative": "dr"}),
+    }
+    return {"formula": formula, "count": 1, "start": 0, "stop": 1}

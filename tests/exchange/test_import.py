@@ -1,0 +1,369 @@
+"""Settings files as scenes: formula, camera, light, colours, what is told, and files that mean harm."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import settings as of_tests
+from hypothesis import strategies as st
+
+from clfractal.camera.views import camera_view
+from clfractal.errors import ClfractalError, FileError
+from clfractal.exchange.installed import find_installed
+from clfractal.exchange.mandelbulber import Imported, import_settings, import_text
+from clfractal.scene.load import load_scene
+from tests.exchange.files import FOLD, check_line, program, settings
+from tests.shell import InProcess
+
+CAMERA = (
+    "camera 3 -5 2;\ntarget 0 1 0.5;\ncamera_top -0.2 0.3 1;\nfov 0.8;\nimage_width 64;\nimage_height 48;"
+)
+
+
+def imported(main_keys: str = "", fractal: str = "", **options: Any) -> Imported:
+    return import_text(settings(main_keys, fractal), "x.fract", **options)
+
+
+class TestScenes:
+    def test_what_every_file_gives(self) -> None:
+        found = imported(CAMERA)
+        scene = load_scene(found.scene)
+        assert (scene.image.width, scene.image.height) == (64, 48)
+        assert scene.camera.position == (3, -5, 2)
+        assert scene.camera.target == (0, 1, 0.5)
+        assert math.tan(math.radians(found.scene["camera"]["fov"] / 2)) == pytest.approx(0.4)
+        assert found.scene["formula"] == {
+            "name": "cosine_mandelbulb",
+            "parameters": {"power": 9, "z_sign": 1},
+            "iterations": 251,
+        }
+        assert found.remarks == ()
+        assert load_scene(found.text("x.fract")) == scene
+
+    @pytest.mark.parametrize(
+        ("main_keys", "fractal", "formula"),
+        [
+            ("formula_1 8;\nN 20;", "mandelbox_scale -1.5;", {"name": "mandelbox", "iterations": 21}),
+            ("formula_1 7;\nN 20;", "", {"name": "menger_sponge", "iterations": 20}),
+            (
+                "julia_mode true;\njulia_c 0.1 0.2 0.3;\nN 20;",
+                "power 4;",
+                {"iterations": 20, "julia": [0.1, 0.2, 0.3]},
+            ),
+            ("formula_1 3;\ndont_add_c_constant_1 true;\nN 5;", "", {"iterations": 5, "julia": [0, 0, 0]}),
+            ("formula_1 5;\nN 5;", "", {"name": "quaternion_mandelbrot", "iterations": 6}),
+            (
+                "formula_1 19;\nN 5;",
+                "cadd 0.5;",
+                {"name": "aexion", "parameters": {"plus": 0.5}, "iterations": 6},
+            ),
+        ],
+    )
+    def test_formulas_of_the_library(
+        self, main_keys: str, fractal: str, formula: dict[str, Any], tmp_path: Path
+    ) -> None:
+        # Without texts: what is found is found in the library.
+        found = imported(main_keys, fractal, formulas=program(tmp_path)).scene["formula"]
+        assert {key: found[key] for key in formula} == formula
+        load_scene({"version": 1, "formula": found, "camera": {}})
+
+    def test_what_the_library_has_not_without_texts(self, tmp_path: Path) -> None:
+        folder = program(tmp_path)
+        for main_keys, fractal, reason in (
+            ("formula_1 8;", "mandelbox_folding_limit 1.5;", "it folds at 1.5 by 2, not at 1 by 2"),
+            ("", "power 2.5;", "its power is 2.5; ours are whole, 2 to 16"),
+            (
+                "formula_1 7;\ndont_add_c_constant_1 true;",
+                "",
+                "our library has it, but not with what is added here",
+            ),
+        ):
+            with pytest.raises(FileError) as caught:
+                imported(f"N 4;\n{main_keys}", fractal, formulas=folder)
+            assert reason in str(caught.value)
+            assert str(caught.value).startswith("x.fract")
+
+    def test_the_picture_of_an_old_file_is_upside_down(self) -> None:
+        plain, old = (
+            load_scene(imported(f"{CAMERA}\nlegacy_coordinate_system {word};").scene)
+            for word in ("false", "true")
+        )
+        rays = []
+        for scene in (plain, old):
+            view = camera_view(scene.camera, 64, 48)
+            corners = [
+                view.center + 0.5 * (sx * view.width * view.side + sy * view.height * view.up) - view.origin
+                for sx, sy in ((-1, 1), (1, 1), (-1, -1))
+            ]
+            rays.append([corner / np.linalg.norm(corner) for corner in corners])
+        flip = np.diag([1.0, 1.0, -1.0])
+        for corner, other in ((0, 2), (2, 0)):
+            np.testing.assert_allclose(flip @ rays[0][corner], rays[1][other], atol=1e-12)
+
+    def test_light(self) -> None:
+        # From behind the camera, from its left, from above; and in space.
+        for keys, direction in (
+            ("main_light_alpha 0;\nmain_light_beta 0;", (0, 1, 0)),
+            ("main_light_alpha -90;\nmain_light_beta 0;", (1, 0, 0)),
+            ("main_light_beta 90;", (0, 0, -1)),
+        ):
+            camera = "camera 0 -5 0;\ntarget 0 0 0;\ncamera_top 0 0 1;"
+            (light,) = imported(f"{camera}\n{keys}").scene["lights"]
+            assert light["direction"] == pytest.approx(direction, abs=1e-9)
+        # What comes from the right in space comes from the left of a camera that looks the other way.
+        behind = "camera 0 5 0;\ntarget 0 0 0;\ncamera_top 0 0 1;\nmain_light_alpha 90;\nmain_light_beta 0;"
+        assert imported(behind).scene["lights"][0]["direction"] == pytest.approx((1, 0, 0), abs=1e-9)
+        fixed = imported(f"{behind}\nmain_light_position_relative false;").scene["lights"][0]
+        assert fixed["direction"] == pytest.approx((-1, 0, 0), abs=1e-9)
+        lamps = "main_light_enable false;\naux_light_enabled_2 true;\naux_light_position_2 1 2 3;\nshadows_enabled false;"
+        (lamp,) = imported(f"{CAMERA}\n{lamps}").scene["lights"]
+        assert (lamp["type"], lamp["position"]) == ("point", [1, 2, 3])
+
+    def test_colours(self) -> None:
+        scene = imported(
+            "mat1_surface_color_gradient 0 ff0000 2500 00ff00;\nmat1_coloring_speed 2;\nglow_enabled 0;"
+        ).scene
+        assert scene["coloring"]["palette"] == [
+            {"at": 0, "color": "#ff0000"},
+            {"at": 0.25, "color": "#00ff00"},
+            {"at": 1, "color": "#ff0000"},
+        ]
+        assert scene["coloring"]["scale"] == pytest.approx(2 * 5000 / 2560, rel=1e-5)
+        old = imported(
+            "surface_color_palette 5500 94ce5e ;\ncoloring_speed 3;\nformula_1 10;", "IFS_scale 3;"
+        )
+        assert [stop["color"] for stop in old.scene["coloring"]["palette"]] == [
+            "#005500",
+            "#94ce5e",
+            "#005500",
+        ]
+        single = imported("mat1_use_colors_from_palette false;\nmat1_surface_color ffff 0 8000;").scene
+        assert "coloring" not in single
+        assert single["material"]["color"][:2] == [1, 0]
+        assert "glow" in single
+        assert imported(f"{CAMERA}\nglow_intensity 9;").scene["glow"]["intensity"] == 1
+        assert "glow" not in scene
+
+    def test_background_is_what_is_seen_above_and_below(self) -> None:
+        level = "camera 0 -5 0;\ntarget 0 0 0;\ncamera_top 0 0 1;\nfov 2;"
+        colors = "background_color_1 ffff 0 0;\nbackground_color_2 0 ffff 0;\nbackground_color_3 0 0 ffff;"
+        background = imported(f"{level}\n{colors}").scene["background"]
+        part = math.sqrt(0.5)  # a ray at 45 degrees
+        decoded = [((each + 0.055) / 1.055) ** 2.4 for each in (part, 1 - part)]
+        assert background["top"] == pytest.approx([decoded[0], decoded[1], 0], abs=1e-5)
+        assert background["bottom"] == pytest.approx([0, decoded[1], decoded[0]], abs=1e-5)
+
+    def test_fog_limits_and_output(self) -> None:
+        keys = (
+            "basic_fog_enabled true;\nbasic_fog_visibility 4;\nlimits_enabled true;\nlimit_min -1 -2 -3;\n"
+            "limit_max 1 0 3;\nbrightness 2;\nhdr true;\ngamma 0.5;"
+        )
+        found = imported(f"{CAMERA}\n{keys}")
+        assert found.scene["fog"]["density"] == 0.25
+        assert found.scene["objects"]["limits"]["position"] == [0, -1, 0]
+        assert found.scene["objects"]["limits"]["size"] == [2, 2, 6]
+        assert found.scene["output"] == {"exposure": 2.2, "tone": "reinhard"}
+        assert found.remarks == ("gamma: 0.5 is not taken over",)
+        load_scene(found.scene)
+
+    def test_depth_of_field(self) -> None:
+        scene = load_scene(imported(f"{CAMERA}\nDOF_enabled true;\nDOF_focus 4;\nDOF_radius 5;").scene)
+        assert scene.camera.lens_radius == pytest.approx(0.0015 * 5 * 4)  # type: ignore[union-attr]
+        assert scene.camera.focus_distance == 4  # type: ignore[union-attr]
+        sharp = imported(f"{CAMERA}\nDOF_focus 4;")
+        assert "f_number" not in sharp.scene["camera"]
+        assert sharp.remarks == ()
+
+    def test_another_look(self) -> None:
+        scene = load_scene(imported(CAMERA, look="ours").scene)
+        assert scene.lighting.mode == "path"
+        assert scene.environment is not None
+
+    def test_everything_else_is_told(self) -> None:
+        keys = (
+            "iteration_fog_enable true;\niteration_fog_opacity 3;\nstereo_enabled true;\nflight_speed 2;\n"
+            "DE_factor 0.5;\nnever_seen 1;"
+        )
+        found = imported(f"{CAMERA}\nfractal_constant_factor 1 1 1;\n{keys}\nperspective_type 2;")
+        assert found.remarks == (
+            "perspective_type: equirectangular is not there yet; the picture is in perspective",
+            "line 13: iteration_fog_opacity = 3 is not taken over",
+            "line 14: stereo_enabled = true is not taken over",
+            "line 17: never_seen = 1 is not taken over",
+            "1 key of how their rays find the surface: ours find it by themselves",
+            "1 key of windows, films and files: not a part of the picture",
+        )
+
+
+class TestShell:
+    @pytest.fixture
+    def clf(
+        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    ) -> InProcess:
+        monkeypatch.chdir(tmp_path)
+        return InProcess(capsys)
+
+    def test_import(self, clf: InProcess, tmp_path: Path) -> None:
+        Path("bulb.fract").write_text(settings(f"{CAMERA}\nnever_seen 1;"), encoding="utf-8")
+        ended = clf("import", "bulb.fract")
+        assert ended.status == 0
+        assert "bulb.fract: line 11: never_seen = 1 is not taken over" in ended.err
+        assert "bulb.yaml: 1 thing is not taken over" in ended.err
+        assert load_scene("bulb.yaml") == load_scene("bulb.fract")
+        ended = clf("import", "bulb.fract")
+        message = "bulb.yaml: exists already and is not replaced; name another file by -o\n"
+        assert (ended.status, ended.err) == (2, message)
+        assert clf("import", "bulb.fract", "-o", "bulb.yaml", "--look", "ours").status == 0
+        assert load_scene("bulb.yaml").lighting.mode == "path"
+        for arguments, message in (
+            (
+                ["bulb.fract", "-o", "x.yaml", "--look", "our"],
+                "--look: unknown look 'our'; did you mean 'ours'?",
+            ),
+            (["bulb.yaml", "-o", "x.yaml"], "bulb.yaml:1: is no settings file of Mandelbulber 2"),
+            (["none.fract"], "none.fract: cannot be read: No such file or directory"),
+            (["bulb.fract", "-o", "x.png"], "x.png: "),
+            (["bulb.fract", "-o", "x.yaml", "--formulas", "none"], "none: is no folder"),
+        ):
+            ended = clf("import", *arguments)
+            assert ended.status == 2
+            assert ended.err.startswith(message)
+            assert ended.err.count("\n") == 1
+        assert sorted(each.name for each in tmp_path.iterdir()) == ["bulb.fract", "bulb.yaml"]
+
+    def test_a_folder_of_formulas(self, clf: InProcess, tmp_path: Path) -> None:
+        program(tmp_path / "theirs", menger_mod1=FOLD)
+        Path("fold.fract").write_text(settings("formula_1 61;\nN 6;"), encoding="utf-8")
+        assert clf("import", "fold.fract", "--formulas", "theirs").status == 0
+        scene = load_scene("fold.yaml")
+        assert scene.chain.links[0].bound.formula.title == "Formula 61 of Mandelbulber"
+        made_of = Path("theirs") / "formula" / "opencl" / "menger_mod1.cl"
+        assert f"formula_1, 61, is made of {made_of}" in Path("fold.yaml").read_text(encoding="utf-8")
+
+
+WORDS = (
+    "nan",
+    "1e30",
+    "-1e30",
+    "",
+    "true",
+    "0 0 0",
+    "999999999999",
+    "ffff ffff ffff",
+    "1,5",
+    "1;2",
+    "é",
+    "type2",
+    "-1",
+)
+
+
+@of_tests(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
+@given(st.data())
+def test_mutations_end_in_a_scene_or_in_one_line(data: st.DataObject) -> None:
+    lines = settings(
+        f"{CAMERA}\nformula_1 8;\nformula_2 7;\nhybrid_fractal_enable true;\nformula_iterations_1 2;\nN 6;\n"
+        "limits_enabled true;\nbasic_fog_enabled true;\nmat1_surface_color_gradient 0 ff0000 5000 00ff00;\n"
+        "aux_light_enabled_1 true;\nmain_light_alpha 10;\nbackground_color_1 0 0 ffff;",
+        "mandelbox_scale -1.5;",
+        "[fractal_2]\ntransf_scale_3 3;",
+    ).split("\n")
+    for _ in range(data.draw(st.integers(1, 3))):
+        place = data.draw(st.integers(0, len(lines) - 1))
+        kind = data.draw(st.sampled_from(("value", "drop", "twice", "letter", "cut")))
+        line = lines[place]
+        if kind == "value":
+            lines[place] = f"{line.partition(' ')[0]} {data.draw(st.sampled_from(WORDS))};"
+        elif kind == "drop":
+            lines[place] = ""
+        elif kind == "twice":
+            lines.insert(place, line)
+        elif kind == "letter" and line:
+            at = data.draw(st.integers(0, len(line) - 1))
+            lines[place] = line[:at] + data.draw(st.characters()) + line[at + 1 :]
+        elif kind == "cut":
+            lines[place] = line[: len(line) // 2]
+    try:
+        found = import_text("\n".join(lines), "x.fract")
+        text = found.text("x.fract")
+        assert all(remark.isprintable() or "\n" not in remark for remark in found.remarks)
+        load_scene(text)
+    except ClfractalError as error:
+        check_line(error)
+
+
+def test_the_examples_that_are_installed() -> None:
+    """Each becomes a scene, or is refused in one line."""
+    installed = find_installed()
+    if installed is None:
+        pytest.skip("Mandelbulber 2 is not installed")
+    made = 0
+    examples = sorted((installed.folder / "examples").glob("*.fract"))[::5]
+    for path in examples:
+        try:
+            load_scene(import_settings(path).scene)
+            made += 1
+        except ClfractalError as error:
+            check_line(error)
+    assert made > 0.6 * len(examples)
+
+
+class TestSolids:
+    def test_solids_planes_and_water(self) -> None:
+        keys = (
+            "primitive_sphere_1_enabled true;\nprimitive_sphere_1_position 3 0 0;\nprimitive_box_2_enabled true;\n"
+            "primitive_box_2_size 1 2 3;\nprimitive_box_2_material_id 2;\nmat2_surface_color ffff 0 0;\n"
+            "primitive_cone_1_enabled true;\nprimitive_cone_1_height 2;\nprimitive_water_1_enabled true;\n"
+            "primitive_water_1_length 0.5;\nprimitive_rectangle_1_enabled true;\nprimitive_torus_1_radius 3;"
+        )
+        found = imported(f"{CAMERA}\nlegacy_coordinate_system false;\n{keys}")
+        scene = load_scene(found.scene)
+        assert found.scene["objects"] == {
+            "box 2": {"type": "box", "position": [0, 0, 0], "size": [1, 2, 3], "material": "material 2"},
+            "cone 1": {"type": "cone", "position": [0, 0, 1], "radius": 1, "height": 2},
+            "sphere 1": {"type": "sphere", "position": [3, 0, 0], "radius": 1},
+            "water 1": {"type": "water", "position": [0, 0, 0], "waves": {"height": 0.1, "length": 0.5}},
+        }
+        assert scene.materials["material 2"].base.color == (1, 0, 0)
+        assert found.remarks == ("primitive_rectangle_1_enabled: there is no rectangle among our objects",)
+
+    def test_a_rotation_turns_as_their_matrix_does(self) -> None:
+        from clfractal.elements.shapes.box import BoxObject
+        from clfractal.exchange.parameters import rotation
+
+        keys = (
+            "primitive_box_1_enabled true;\nprimitive_box_1_rotation 20 -35 50;\nprimitive_box_1_size 1 2 3;"
+        )
+        box = load_scene(imported(f"{CAMERA}\n{keys}").scene).objects["box 1"]
+        assert isinstance(box, BoxObject)
+        theirs = np.array(rotation((20.0, -35.0, 50.0, 0.0), reverse=True))
+        for point in np.random.default_rng(1).normal(size=(200, 3)):
+            inside = bool(np.all(np.abs(theirs @ point) <= np.array([0.5, 1, 1.5])))
+            assert box.holds(tuple(point)) == inside
+
+    def test_joined_formulas(self) -> None:
+        keys = (
+            "boolean_operators true;\nN 6;\nformula_1 7;\nformula_2 2;\nformula_3 8;\nboolean_operator_1 2;\n"
+            "formula_position_2 1 2 3;\nformula_scale_2 4;\nboolean_operator_2 0;\n"
+            "julia_mode_2 true;\njulia_c_2 0.1 0.2 0.3;"
+        )
+        found = imported(f"{CAMERA}\n{keys}")
+        scene = load_scene(found.scene)
+        assert found.scene["formula"]["name"] == "menger_sponge"
+        cut, common = (found.scene["objects"][f"formula {slot}"] for slot in (2, 3))
+        assert (cut["join"], cut["position"], cut["scale"]) == ("cut", [1, 2, 3], 0.25)
+        assert cut["formula"]["julia"] == [0.1, 0.2, 0.3]
+        assert (common["join"], common["formula"]["name"]) == ("intersection", "mandelbox")
+        assert len(scene.joined) == 2
+
+    def test_lamps_within_solids_are_left_out(self) -> None:
+        keys = "aux_light_enabled_1 true;\naux_light_position_1 0.1 0 0;\naux_light_enabled_2 true;\nN 9;"
+        found = imported(f"{CAMERA}\n{keys}")
+        assert [light.get("type") for light in found.scene["lights"]] == [None, "point"]
+        assert found.remarks == ("a lamp at 0.1, 0, 0 is within a solid; left out",)
+        load_scene(found.scene)
