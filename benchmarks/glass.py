@@ -12,23 +12,13 @@ together, which both programs keep busy, and of rendering alone, without compili
 from __future__ import annotations
 
 import argparse
-import json
-import statistics
-import subprocess
-import sys
-import tempfile
-import time
-from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
-import numpy as np
-import numpy.typing as npt
+from benchmarks.equal_error import Drawn, Picture, drawn_by_turns, ours, print_head, print_rows, theirs
+from clfractal.api import load_scene
+from clfractal.scene.model import Scene
 
-from benchmarks.rivals.base import MissingError
-from clfractal.api import load_scene, render
-
-WIDTH, HEIGHT, BLOCK = 320, 240, 8
+WIDTH, HEIGHT = 320, 240
 EYE, TARGET, FOV = [2.5, -5, 2.2], [0, 0, 0.45], 30
 BOUNCES, ROULETTE = 12, 4
 SKY, LIGHT, FLOOR = [0.5, 0.55, 0.6], [12, 12, 12], [0.6, 0.6, 0.55]
@@ -48,20 +38,10 @@ SCENES: dict[str, dict[str, Any]] = {
     "water": {"tumbler": {**TUMBLER, "material": "glass"}, "drink": {**DRINK, "material": "water"}},
 }
 
-Floats = npt.NDArray[np.float64]
 
-
-@dataclass(slots=True)
-class Drawn:
-    """A program's pictures, each of shape (height, width, 3), and the seconds of all cores for each."""
-
-    pictures: list[Floats] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-
-
-def ours(scene: str, samples: int, seed: int, device: str | None) -> tuple[Floats, float]:
-    """This engine's picture, and the seconds of all cores."""
-    found = load_scene(
+def scene_of(scene: str, samples: int, seed: int) -> Scene:
+    """The scene for this engine."""
+    return load_scene(
         {
             "version": 1,
             "formula": "none",
@@ -79,53 +59,35 @@ def ours(scene: str, samples: int, seed: int, device: str | None) -> tuple[Float
             "renderer": {"samples": samples, "seed": seed},
         }
     )
-    begun = time.process_time()
-    framebuffer = render(found, device=device)
-    seconds = time.process_time() - begun
-    light = np.stack([framebuffer[name] for name in "RGB"], axis=-1).astype(np.float64)
-    return light, seconds
 
 
-def theirs(scene: str, samples: int, seed: int) -> tuple[Floats, float]:
-    """Mitsuba's picture, and the seconds of its rendering. Raises MissingError."""
-    with tempfile.TemporaryDirectory(prefix="glass-") as folder:
-        file = Path(folder, "found.npz")
-        told = {
-            "scene": scene,
-            "samples": samples,
-            "seeds": [seed],
-            "size": [WIDTH, HEIGHT],
-            "file": str(file),
-            "eye": EYE,
-            "target": TARGET,
-            "fov": FOV,
-            "bounces": BOUNCES,
-            "roulette": ROULETTE,
-            "sky": SKY,
-            "light": LIGHT,
-            "floor": FLOOR,
-            "lamp": LAMP,
-        }
-        command = [sys.executable, "-m", "benchmarks.rivals.mitsuba_glass"]
-        ended = subprocess.run(command, input=json.dumps(told), text=True, capture_output=True, check=False)
-        if ended.returncode:
-            raise MissingError((ended.stderr.strip().splitlines() or ["Mitsuba failed"])[-1])
-        with np.load(file) as found:
-            return found["light"][0].astype(np.float64), float(found["seconds"][0])
+def of_mitsuba(scene: str, samples: int, seed: int) -> Picture:
+    """Mitsuba's picture. Raises MissingError."""
+    told = {
+        "scene": scene,
+        "samples": samples,
+        "size": [WIDTH, HEIGHT],
+        "eye": EYE,
+        "target": TARGET,
+        "fov": FOV,
+        "bounces": BOUNCES,
+        "roulette": ROULETTE,
+        "sky": SKY,
+        "light": LIGHT,
+        "floor": FLOOR,
+        "lamp": LAMP,
+    }
+    return theirs("mitsuba_glass", told, seed)
 
 
-def blocks(light: Floats) -> Floats:
-    """The means of blocks."""
-    return np.asarray(
-        light.reshape(HEIGHT // BLOCK, BLOCK, WIDTH // BLOCK, BLOCK, 3).mean(axis=(1, 3)), np.float64
+def measured(scene: str, rounds: int, samples: int, device: str | None) -> dict[str, Drawn]:
+    """The pictures of both programs."""
+    ours(scene_of(scene, 1, 0), device)  # builds the programs
+    return drawn_by_turns(
+        rounds,
+        lambda seed: ours(scene_of(scene, samples, seed), device),
+        lambda seed: of_mitsuba(scene, samples, seed),
     )
-
-
-def variances(drawn: Drawn) -> tuple[float, float]:
-    """Of pixels, and of blocks."""
-    pictures = np.stack(drawn.pictures)
-    of_blocks = np.stack([blocks(each) for each in drawn.pictures])
-    return float(pictures.var(axis=0, ddof=1).mean()), float(of_blocks.var(axis=0, ddof=1).mean())
 
 
 def main() -> None:
@@ -137,34 +99,9 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=8)
     parser.add_argument("--device")
     given = parser.parse_args()
-    print(
-        "| scene | program | seconds | mean light | variance of pixels | of blocks | cost by pixels | by blocks |"
-    )
-    print("|---|---|--:|--:|--:|--:|--:|--:|")
+    print_head()
     for scene in SCENES:
-        ours(scene, 1, 0, given.device)  # builds the programs
-        drawn = {"clfractal": Drawn(), "Mitsuba": Drawn()}
-        for seed in range(given.rounds):
-            for name, (light, seconds) in (
-                ("clfractal", ours(scene, given.samples, seed, given.device)),
-                ("Mitsuba", theirs(scene, given.samples, seed)),
-            ):
-                drawn[name].pictures.append(light)
-                drawn[name].seconds.append(seconds)
-        costs: dict[str, tuple[float, float]] = {}
-        rows = []
-        for name, each in drawn.items():
-            pixels, of_blocks = variances(each)
-            seconds = statistics.median(each.seconds)
-            costs[name] = (pixels * seconds, of_blocks * seconds)
-            rows.append((name, seconds, float(np.mean(each.pictures)), pixels, of_blocks))
-        for name, seconds, mean, pixels, of_blocks in rows:
-            beside = [own / other for own, other in zip(costs[name], costs["Mitsuba"], strict=True)]
-            print(
-                f"| {scene} | {name} | {seconds:.2f} | {mean:.4f} | {pixels:.3g} | {of_blocks:.3g} |"
-                f" {beside[0]:.2f} | {beside[1]:.2f} |",
-                flush=True,
-            )
+        print_rows(scene, measured(scene, given.rounds, given.samples, given.device))
 
 
 if __name__ == "__main__":

@@ -327,7 +327,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
             "cross_media?",
             "find_materials?",
             "scatter_paths?",
-            "pass_clouds?",
+            "walk_clouds? pass_clouds",
             "meet_objects?",
             "march_rays? lights",
             "gather_air?",
@@ -339,11 +339,14 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
         ("meet_objects?", "march_rays? whether", "cross_media?", "end_paths?"),
     ),
 )
-# Kernels that stand in the place of one that is drawn: for single lanes, the other search, cloudy glass.
+# Kernels that stand in the place of one that is drawn, or beside it: for single lanes, the other search, glass, water.
 _BESIDE = {
     "march_rays": ("look_at_surfaces", "step_rays", "look_where_steps_end"),
     "march_points": ("look_at_points",),
-    "scatter_paths": ("scatter_costly",),
+    "scatter_paths": ("scatter_costly", "bend_light", "bend_shapes"),
+    "gather_paths": ("find_sought", "gather_sought"),
+    "end_paths": ("end_bent_light", "end_bent_shapes", "find_last", "end_sought"),
+    "walk_clouds": ("pass_clouds",),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),
 }
 _ASK_FORMULA = (

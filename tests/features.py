@@ -61,6 +61,7 @@ _MAPS = {
     },
     "material": {"name": "both"},
 }
+_EMBERS = {"emission": {"luminance": 4}}
 _OBJECTS = {
     "sea": {"type": "water", "position": [0, 0, -3], "material": "wood"},
     "ball": {"type": "sphere", "position": [3, 0, 0], "radius": 1, "material": "wood"},
@@ -84,10 +85,10 @@ _CLOUDS = {
         },
     },
 }
-_JOINED = {
+_JOINED: dict[str, dict[str, Any]] = {
     "hole": {"type": "sphere", "join": "cut"},
     "drop": {"type": "box", "position": [1, 0, 0], "join": "smooth_union"},
-    "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0]},
+    "other": {"type": "formula", "formula": {"name": "hast"}, "position": [3, 0, 0], "material": "embers"},
     "mould": {"type": "formula", "formula": {"name": "hast"}, "position": [0, -1, 0], "join": "cut"},
 }
 # Of features whose code is a part of another one's only the other is here: a sky has a map, shafts of light have fog, lamps
@@ -121,7 +122,12 @@ SURFACE: Mapping[str, Values] = {
     "objects": {
         "": {},
         "objects": {"objects": _OBJECTS, "materials": {"wood": {}}},
-        "joined": {"objects": _JOINED},
+        "joined": {"objects": _JOINED, "materials": {"embers": _EMBERS}},
+        # A part of the set that is a body for itself along paths.
+        "pane": {
+            "objects": {"other": {**_JOINED["other"], "material": "pane"}, "mould": _JOINED["mould"]},
+            "materials": {"pane": {"transmission": {"weight": 1}}},
+        },
         # Beside them objects that shine.
         "grids": {
             "objects": {**_GRIDS, **_LAMPS},
@@ -190,7 +196,11 @@ APART = {
     *(frozenset({("lighting", light), ("planes", "cut")}) for light in ("glass", "skin")),
     # These have planes of their own.
     *(frozenset({("objects", "opened"), ("planes", name)}) for name in ("planes", "cut")),
-    *(frozenset({("objects", "joined"), ("planes", name)}) for name in ("planes", "cut")),
+    *(
+        frozenset({("objects", own), ("planes", name)})
+        for own in ("joined", "pane")
+        for name in ("planes", "cut")
+    ),
     frozenset({("objects", "joined"), ("lighting", "glass")}),
     frozenset({("objects", "clouds"), ("lighting", "")}),
     # So they have neither points nor a plane through them.

@@ -341,7 +341,7 @@ def test_a_driver_that_aborts(here: Path, clf: InProcess, monkeypatch: pytest.Mo
     monkeypatch.setenv("CLFRACTAL_TEST_ABORT", "surface")
     monkeypatch.setenv("CLFRACTAL_CACHE", str(here / "cache.yaml"))
     monkeypatch.setenv("CLFRACTAL_LANES", "1")
-    ended = clf("render", "scene.yaml", "-o", "old.png")
+    ended = clf("render", "scene.yaml", "-o", "old.png", "--quiet")
     assert ended.is_one_line(3, "the driver aborted (signal 6) while building")
     assert untouched(here)
 

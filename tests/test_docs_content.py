@@ -31,7 +31,21 @@ from clfractal.files import document, regular
 from clfractal.files.channels import CHANNELS, DEFAULT_CHANNELS
 from clfractal.files.exr import read_exr
 from clfractal.files.png import read_texts
-from clfractal.formulas import binding, build, catalog, chain, evaluate, nodes, own, parser, turns
+from clfractal.formulas import (
+    binding,
+    build,
+    build_blocks,
+    build_orbit,
+    build_parameters,
+    catalog,
+    chain,
+    evaluate,
+    names,
+    nodes,
+    own,
+    parser,
+    turns,
+)
 from clfractal.formulas import definition as model
 from clfractal.images.anaglyph import IDEAL, Filter, Floats, Glasses, Method, matrices, mix
 from clfractal.images.modes import eye_size, picture_size
@@ -93,7 +107,9 @@ def test_every_key_of_a_formula_is_described() -> None:
     rows = table("formulas.md", "The keys")
     assert {code(row[0]) for row in rows} == set(build._KEYS)
     assert {code(row[0]) for row in rows if row[1] == "required"} == set(build._REQUIRED)
-    assert {code(row[0]) for row in table("formulas.md", "Parameters")} == set(build._PARAMETER_KEYS)
+    assert {code(row[0]) for row in table("formulas.md", "Parameters")} == set(
+        build_parameters._PARAMETER_KEYS
+    )
     assert {code(row[0]) for row in table("formulas.md", "Chains")} == set(catalog._CHAIN_KEYS)
 
 
@@ -107,7 +123,7 @@ def test_every_function_of_the_language_is_described() -> None:
 
 def test_reserved_names_are_told() -> None:
     told = set(re.findall(r"`(\w+)`", section("formulas.md", "Names")))
-    assert build._RESERVED - set(nodes.FUNCTIONS) <= told
+    assert names._RESERVED - set(nodes.FUNCTIONS) <= told
 
 
 def test_the_message_about_the_formula_of_the_tutorial(here: Path, clf: InProcess) -> None:
@@ -125,8 +141,16 @@ def test_limits_of_formulas() -> None:
         "numbers, names and operations of an expression": parser.MAX_NODES,
         "levels of nesting": parser.MAX_DEPTH,
         "constant exponents": evaluate.MAX_EXPONENT,
-        "parameters": build.MAX_PARAMETERS,
-        "names in `let`": build.MAX_LETS,
+        "numbers, names and operations of an expression, functions and vectors written in": parser.MAX_EXPANDED,
+        "parameters": build_parameters.MAX_PARAMETERS,
+        "names in `let`": build_orbit.MAX_LETS,
+        "numbers in `state`": build_orbit.MAX_STATE,
+        "`functions`": build_orbit.MAX_FUNCTIONS,
+        "statements": build_blocks.MAX_STATEMENTS,
+        "conditions and loops within each other": build_blocks.MAX_BLOCKS,
+        "turns of a loop": build_blocks.MAX_TURNS,
+        "numbers, names and operations of all statements": build_blocks.MAX_WRITTEN,
+        "the same, each turn of a loop counted": build_blocks.MAX_DONE,
         "`repeat`": model.MAX_REPEAT,
         "formulas in a chain": chain.MAX_LINKS,
         "`count` of a formula in a chain": chain.MAX_COUNT,

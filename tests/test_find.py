@@ -105,6 +105,15 @@ def test_the_seed_chooses_and_no_more(sponge: tuple[Scene, list[FoundView]]) -> 
     assert cameras(find(scene, count=4, seed=1)) != cameras(found)
 
 
+def test_a_token_ends_the_search() -> None:
+    token = clfractal.CancelToken()
+    token.cancel()
+    with pytest.raises(clfractal.Stopped):
+        find(SPONGE, count=1, token=token)
+    with pytest.raises(clfractal.SceneError, match="token: must be a CancelToken"):
+        find(SPONGE, token=1)  # type: ignore[arg-type]
+
+
 def test_a_closed_hall_is_seen_from_inside() -> None:
     found = find(HALL, count=4, seed=3)
     assert found

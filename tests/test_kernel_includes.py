@@ -18,7 +18,6 @@ from clfractal.device.source import kinds
 from clfractal.files.resources import folder
 from clfractal.schema.kinds import members
 from clfractal.schema.light import SingleLight
-from clfractal.schema.shape import solids
 from clfractal.shading.light_records import LIGHT_KINDS
 
 Graph = dict[str, set[str]]
@@ -211,10 +210,10 @@ def test_functions_are_counted() -> None:
 
 
 def test_each_shape_is_a_file_with_all_functions() -> None:
-    """Shapes of scenes and of kernels are the same, and each has what is asked of it; solids, what paths ask for too."""
+    """Shapes of scenes and of kernels are the same, and each has what is asked of it, and what paths ask for."""
     assert SHAPE_KINDS.keys() == {kind.tag for kind in members("shapes")}
-    assert kinds("elements/shapes/emitters").keys() == {kind.tag for kind in solids()}
-    check_functions("geometry/shapes.h", "elements/shapes", 5)
+    assert kinds("elements/shapes/emitters").keys() == kinds("elements/shapes").keys()
+    check_functions("geometry/shapes.h", "elements/shapes", 6)
     check_functions("shading/emitter_places.h", "elements/shapes/emitters", 2)
     for name in SHAPE_KINDS:
         # How its span is found is said by a constant, so that a loop over objects has no others' code.
@@ -228,7 +227,7 @@ def test_each_light_is_a_file_with_all_functions() -> None:
     assert LIGHT_KINDS.keys() == {kind.tag for kind in single}
     assert kinds("elements/lights/area_lights").keys() == {kind.tag for kind in single if kind.is_seen}
     check_functions("shading/light_at.h", "elements/lights", 1)
-    check_functions("shading/light_places.h", "elements/lights/area_lights", 4)
+    check_functions("shading/light_places.h", "elements/lights/area_lights", 5)
 
 
 def check_functions(interface: str, family: str, count: int) -> None:

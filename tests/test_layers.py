@@ -34,6 +34,7 @@ OWNERS = {
         )
     },
     "cmap": {"scene/palette.py"},
+    "pycparser": {"exchange/c_text.py"},
     "skimage": {"voxels/isosurface.py"},
     "glfw": {"viewer/window.py", "cli/view.py"},
     "OpenGL": {"viewer/gl.py", "cli/view.py"},

@@ -1,18 +1,13 @@
-"""Mitsuba 3's pictures of the scenes of `benchmarks.glass`, in a process of its own.
-
-Reads what is told as JSON, and writes pictures, shape (seeds, height, width, 3), and the seconds of all cores that each
-took.
-"""
+"""Mitsuba 3's pictures of the scenes of `benchmarks.glass`, in a process of its own (`mitsuba_seeds.py`)."""
 
 from __future__ import annotations
 
-import json
-import sys
-import time
 from typing import Any
 
 import mitsuba as mi
 import numpy as np
+
+from benchmarks.rivals.mitsuba_seeds import framed, write_pictures
 
 _CORNERS = 256
 
@@ -73,58 +68,28 @@ def _ring(inner: float, outer: float, height: float, bsdf: dict[str, Any]) -> An
     return mesh
 
 
-def pictures(told: dict[str, Any]) -> tuple[np.ndarray[Any, Any], list[float]]:
-    """Those that are asked for, and the seconds of all cores that each took."""
+def scene_of(told: dict[str, Any]) -> dict[str, Any]:
+    """The scene that is told."""
     lamp, transform = told["lamp"], mi.ScalarTransform4f()
     toward = np.add(lamp["position"], lamp["direction"]).tolist()
     place = transform.look_at(origin=lamp["position"], target=toward, up=[0, 1, 0])
     sky, light = ({"type": "rgb", "value": told[name]} for name in ("sky", "light"))
-    found = mi.load_dict(
-        {
-            "type": "scene",
-            "integrator": {
-                "type": "path",
-                "max_depth": told["bounces"] + 2,
-                "rr_depth": told["roulette"] + 1,
-            },
-            "sensor": {
-                "type": "perspective",
-                "fov": told["fov"],
-                "fov_axis": "y",
-                "to_world": transform.look_at(origin=told["eye"], target=told["target"], up=[0, 0, 1]),
-                "film": {
-                    "type": "hdrfilm",
-                    "width": told["size"][0],
-                    "height": told["size"][1],
-                    "rfilter": {"type": "box"},
-                },
-                "sampler": {"type": "independent", "sample_count": told["samples"]},
-            },
-            "floor": {
-                "type": "rectangle",
-                "to_world": transform.scale([1000, 1000, 1]),
-                "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": told["floor"]}},
-            },
-            "sky": {"type": "constant", "radiance": sky},
-            "lamp": {
-                "type": "rectangle",
-                "to_world": place.scale([lamp["width"] / 2, lamp["height"] / 2, 1]),
-                "emitter": {"type": "area", "radiance": light},
-            },
-            **bodies(told["scene"]),
-        }
-    )
-    mi.render(found, spp=1)  # begins its threads
-    shown, seconds = [], []
-    for seed in told["seeds"]:
-        begun = time.process_time()
-        shown.append(np.array(mi.render(found, seed=1 + seed, spp=told["samples"]))[..., :3])
-        seconds.append(time.process_time() - begun)
-    return np.stack(shown), seconds
+    return {
+        **framed(told, "path"),
+        "floor": {
+            "type": "rectangle",
+            "to_world": transform.scale([1000, 1000, 1]),
+            "bsdf": {"type": "diffuse", "reflectance": {"type": "rgb", "value": told["floor"]}},
+        },
+        "sky": {"type": "constant", "radiance": sky},
+        "lamp": {
+            "type": "rectangle",
+            "to_world": place.scale([lamp["width"] / 2, lamp["height"] / 2, 1]),
+            "emitter": {"type": "area", "radiance": light},
+        },
+        **bodies(told["scene"]),
+    }
 
 
 if __name__ == "__main__":
-    mi.set_variant("scalar_rgb")
-    wanted = json.load(sys.stdin)
-    light, taken = pictures(wanted)
-    np.savez(wanted["file"], light=light, seconds=taken)
+    write_pictures(scene_of)

@@ -67,6 +67,7 @@ class Pace:
 
     def begin(self) -> None:
         """Starts again with a size that is safe for the heaviest work so far, because the last work may have been light."""
+        self.size = max(self.size, self.least)
         if self.slowest is not None:
             self.size = float(np.clip(self.slowest * self.seconds, self.least, self.most))
             # One slow launch, such as a driver's first, must not make all later pictures slow.

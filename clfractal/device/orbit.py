@@ -18,6 +18,8 @@ Record = np.ndarray[Any, np.dtype[np.void]]
 SHAPE_KINDS = kinds("elements/shapes")
 """Shapes, of solids and of objects."""
 SOLID_KINDS = {"formula": 0, **SHAPE_KINDS}
+BODY_OPAQUE = 255
+"""The number of what light does not go through, among those of bodies: above all."""
 JOINS = {"union": 0, "smooth_union": 1, "cut": 2, "intersection": 3}
 
 ORBIT = Struct(
@@ -60,10 +62,22 @@ ORBIT = Struct(
         Field("reach", "real", 0, "how far around the ball its surface may matter to others, scene units"),
         Field("potential_share", "real", 0, "this radius over that of all that is searched"),
         Field("smoothness", "real", 0, "width of a smooth union, scene units"),
+        Field("body", "int", 0, "which body it is of that light goes through, or BODY_OPAQUE"),
+        Field("bare", "int", 0, "1: the walls of what it cuts belong to that"),
+        Field("planes", "int", 0, "how many planes open it alone; their records follow all solids"),
+        Field("first_plane", "int", 0, "how many records after this one they begin"),
+        # Of the first one of a list.
+        Field(
+            "next_list",
+            "int",
+            0,
+            "how many records after this one the next list begins, of one body alone; 0: there is none",
+        ),
         Field(CANCELLED, "int", 0, "1: the work was cancelled, and long orbits end at once"),
     ],
     kinds=[
         ("SOLID_FORMULA", SOLID_KINDS["formula"]),
+        ("BODY_OPAQUE", BODY_OPAQUE),
         *((f"JOIN_{join.split('_')[0].upper()}", number) for join, number in JOINS.items()),
     ],
 )
@@ -79,7 +93,22 @@ EXTRA_APPLICATIONS = 24
 # A formula by itself: its own space is the scene's.
 _ALONE: dict[str, object] = {
     **dict.fromkeys(
-        ("kind", "join", "flows", "first", "first_count", "logarithmic", "has_shape", "object"), 0
+        (
+            "kind",
+            "join",
+            "flows",
+            "first",
+            "first_count",
+            "logarithmic",
+            "has_shape",
+            "object",
+            "body",
+            "bare",
+            "planes",
+            "first_plane",
+            "next_list",
+        ),
+        0,
     ),
     "solids": 1,
     **dict.fromkeys(("ball_radius", "reach", "potential_share", "smoothness"), 0.0),

@@ -120,6 +120,7 @@ class Drawing:
         self.device, self.outputs = device, outputs
         self.view: PlannedView | None = None
         self.packets = self.group = self.capacity = 0
+        self.kernels = 1  # of a sample
         self.wave = Wave(0, 0, [])
         self.build_ms = 0.0
         self.pace = Pace(1.0)
@@ -178,6 +179,7 @@ class Drawing:
             named = [(made, text.kernels) for text, made in zip(self._texts, built, strict=True)]
             self._kernels = Lease(self.device, named, 2 + number_count(kernel))
         self._kernel, self._stages = kernel, {}
+        self.kernels = sum(1 for _ in kernel.stages((0, 1)))
         if self.observer is not None:
             self.observer.sees(kernel)
 

@@ -11,7 +11,8 @@ import numpy as np
 import numpy.typing as npt
 
 from clfractal.device.activity import doing
-from clfractal.engine.any_engine import AnyEngine, SceneLike
+from clfractal.device.cancel import CancelToken
+from clfractal.engine.any_engine import AnyEngine, SceneLike, check_token
 from clfractal.engine.engine import engine_on
 from clfractal.engine.variations import small_scene
 from clfractal.engine.varied import rounded
@@ -94,7 +95,12 @@ class _Tried:
 
 
 def find(
-    scene: SceneLike, *, count: int = 12, seed: int = 0, device: str | Sequence[str] | None = None
+    scene: SceneLike,
+    *,
+    count: int = 12,
+    seed: int = 0,
+    device: str | Sequence[str] | None = None,
+    token: CancelToken | None = None,
 ) -> list[FoundView]:
     """Looks for views of a scene's set that are worth a look: places near it and within, with depth and light.
 
@@ -107,21 +113,26 @@ def find(
         count: how many are wanted; fewer are given if no more differ and show as much.
         seed: chooses the places that are tried.
         device: as of `render`.
+        token: ends the search when any thread cancels it; `clfractal.Stopped` is then raised.
 
     Raises:
         SceneError: the scene is wrong or shows no surface, or nothing was found.
         DeviceError, KernelBuildError: as of a render.
+        Stopped: the token was cancelled.
     """
     loaded = as_scene(scene)
+    check_token(token)
     with engine_on(device, None) as engine:
-        return found_views(loaded, engine, count=count, seed=seed)
+        return found_views(loaded, engine, count=count, seed=seed, token=token)
 
 
-def found_views(scene: Scene, engine: AnyEngine, *, count: int, seed: int) -> list[FoundView]:
+def found_views(
+    scene: Scene, engine: AnyEngine, *, count: int, seed: int, token: CancelToken | None = None
+) -> list[FoundView]:
     """As `find`, by an engine."""
     count, seed = checked(count, seed)
     check_suitable(scene)
-    return _Finder(scene, engine, seed).views(count)
+    return _Finder(scene, engine, seed, token).views(count)
 
 
 def checked(count: int, seed: int) -> tuple[int, int]:
@@ -152,9 +163,9 @@ def _told(things: Sequence[T], begin: int, end: int) -> Iterator[T]:
 class _Finder:
     """Looks for views of one scene."""
 
-    def __init__(self, scene: Scene, engine: AnyEngine, seed: int) -> None:
+    def __init__(self, scene: Scene, engine: AnyEngine, seed: int, token: CancelToken | None) -> None:
         self.scene = scene.model_copy(update={"animation": None})
-        self.engine = engine
+        self.engine, self.token = engine, token
         self.random = np.random.default_rng(seed)
         self.seen = Seen(self.scene, scene.camera.position, scene.extent)
         self.bright = 1.0
@@ -234,7 +245,7 @@ class _Finder:
 
     def _picture(self, stand: _Stand, look: int) -> Framebuffer:
         scene = self.looks[look].model_copy(update={"camera": self._camera(stand, 0.5 * self.seen.radius)})
-        return self.engine.render(scene, samples=1, channels=CHANNELS)
+        return self.engine.render(scene, samples=1, channels=CHANNELS, token=self.token)
 
     def _judged(self, stand: _Stand, picture: Framebuffer) -> _Tried:
         return _Tried(stand, looked_at(picture, self.seen.radius, self.bright))

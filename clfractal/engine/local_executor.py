@@ -39,6 +39,12 @@ _PIXELS_OF_UNIT = 8192
 # On a processor a launch costs as much as what a kernel does for some hundreds of pixels, and a sample along paths is
 # dozens of stages: so many pixels for each hide that, and what they keep between stages is still in the caches.
 _PIXELS_OF_STAGE = 16_384
+# A sample of many bounces is hundreds of kernels, of which most have little left to do, and a launch takes a tenth of a
+# millisecond for each, whatever its size. If launches of more than so many had no more time than others, that would be
+# all of it, and each would be smaller than the one before, down to single packets. So they have more, and so many pixels.
+_FEW_KERNELS = 100
+_SECONDS_OF_KERNEL = 3e-4
+_PIXELS_OF_KERNEL = 32
 # Device memory for passes that the user is told of before it is taken.
 _WORTH_TELLING = 1 << 28
 
@@ -178,8 +184,10 @@ class LocalExecutor:
         group = pixels_at_a_time(self.device, staged=staged) // TILE_PIXELS if self.supply is None else 0
         cutter = _Cutter(drawing, item, take, places, group)
         pace = drawing.pace
-        pace.seconds = self.budget_seconds / IN_FLIGHT
+        many = max(drawing.kernels - _FEW_KERNELS, 0)
+        pace.seconds = max(self.budget_seconds / IN_FLIGHT, many * _SECONDS_OF_KERNEL)
         pace.most = float(drawing.capacity * cutter.per_tile)
+        pace.least = max(1.0, min(float(many * _PIXELS_OF_KERNEL // view.plan.lanes), pace.most))
         pace.begin()
         counters = Counters(build_ms=drawing.build_ms)
         launches = in_launches(

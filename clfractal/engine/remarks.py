@@ -16,6 +16,7 @@ import numpy.typing as npt
 from clfractal.camera.views import View
 from clfractal.engine.job import Job
 from clfractal.engine.run import Counters, Progress
+from clfractal.geometry.eye_body import eye_body
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.images.store import JournalFramebuffer
 from clfractal.images.tiled import Picture
@@ -191,9 +192,16 @@ def _of_lighting(scene: Scene) -> list[str]:
     """Keys that the scene's way of lighting ignores, where they would have changed the picture."""
     material = scene.material
     if not isinstance(scene.lighting, PathLighting):
-        if material.name is None:
+        named = [] if material.name is None else [f"material.name {material.name}"]
+        named += [
+            f"cut_planes.{number}.material {plane.material}"
+            for number, plane in enumerate(scene.cut_planes)
+            if plane.material is not None
+        ]
+        if not named:
             return []
-        return [f"material.name {material.name} is for lighting.mode path; Phong's keys are shown"]
+        verb = "is" if len(named) == 1 else "are"
+        return [f"{' and '.join(named)} {verb} for lighting.mode path; Phong's keys are shown"]
     unused = []
     keys: tuple[str, ...] = ("ambient", "reflection")
     if material.name is not None:
@@ -353,7 +361,7 @@ def _of_solid(seen: _Seen) -> list[str]:
             continue
         if volume is not None:
             x, y, z = (float(each) for each in _in_zoom(scene, volume, eye))
-        if inside_solid(scene, [(x, y, z)])[0]:
+        if inside_solid(scene, [(x, y, z)])[0] and not (volume is None and eye_body(scene, (x, y, z))):
             return ["the camera is inside the set; move camera.position out of it"]
     return []
 

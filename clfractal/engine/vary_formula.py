@@ -10,6 +10,7 @@ from random import Random
 
 from clfractal.engine.varied import Step, is_locked, rounded, signed
 from clfractal.formulas import catalog
+from clfractal.formulas.blocks import nodes_of
 from clfractal.formulas.definition import BoundFormula, Formula, Parameter
 from clfractal.formulas.nodes import names_in
 from clfractal.scene.model import Scene
@@ -63,7 +64,8 @@ def shown_parameters(formula: Formula) -> list[Parameter]:
     """The parameters that change the set itself: not those that only bounds, radii or the step scale use."""
     nodes = [node for _, node in formula.let]
     nodes += [*formula.map, formula.repeat]
-    nodes += [node for node in (formula.slice, formula.shape) if node is not None]
+    nodes += [*nodes_of(formula.steps), *(each.start for each in formula.state)]
+    nodes += [node for node in (formula.slice, formula.shape, formula.distance) if node is not None]
     used = {name for node in nodes for name in names_in(node)}
     return [parameter for parameter in formula.parameters if parameter.name in used]
 

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from clfractal.device.orbit import SHAPE_KINDS, Record
 from clfractal.device.structs import Field, Precision, Struct
 from clfractal.geometry.object_grids import NO_GRID, ObjectGrids, grid_defines
+from clfractal.geometry.shining import luminance_of, shining_records
 from clfractal.geometry.solids import own_axes
 from clfractal.geometry.water import WAVES, wave_set
 from clfractal.scene.blends import is_glass
@@ -21,9 +22,11 @@ from clfractal.schema.base import Vector
 from clfractal.schema.mapped import Map
 from clfractal.schema.material import WHITE
 from clfractal.schema.shape import AXES, ObjectBase, Simple
-from clfractal.shading.emitters import sampled_radiance
+from clfractal.shading.clear_bodies import clear_bodies, is_shot
+from clfractal.shading.emitters import emitters_of, sampled_radiance
 from clfractal.shading.maps import MappedMaterials, glass_bodies
 from clfractal.shading.materials import used_materials
+from clfractal.shading.set_bodies import set_bodies
 
 _OTHER_KINDS = {"water": 0, "joined": -1, "volume": -2, "cloud": -3}
 OBJECT_KINDS = SHAPE_KINDS | _OTHER_KINDS
@@ -39,7 +42,20 @@ OBJECT = Struct(
     [
         Field("kind", "int", 0, "one of OBJECT_KINDS"),
         Field("material", "int", 0, "the number of its material along paths"),
+        Field(
+            "body",
+            "int",
+            0,
+            "the number of its body, which a part of the set may share; -1: that is opaque, or cuts",
+        ),
         Field("glass", "int", 0, "along paths 1: light goes through it; 2: only below its boundary"),
+        Field(
+            "bends",
+            "int",
+            0,
+            "over how many of its boundaries light is sampled: of a clear level 1, of a clear solid 2; else 0",
+        ),
+        Field("shot", "int", 0, "1: of a solid that is no round ball"),
         Field("middle", "real", 3, "of a solid; a point of a plane, scene units"),
         Field("own_x", "real", 3, "from scene units to its own ones: of the ball or cube of radius 1,"),
         Field("own_y", "real", 3, "or of a plane, whose own z is its normal"),
@@ -55,9 +71,14 @@ OBJECT = Struct(
         Field("mirror", "real", 3, "part that is mirrored sharply, straight on"),
         Field("mirror_edge", "real", 3, "what is mirrored more at grazing angles"),
         Field("emission", "real", 3, "radiance, linear Rec. 709"),
-        Field("sampled", "int", 0, "1: along paths it is sampled as lights are"),
-        Field("radiance", "real", 3, "of one that is sampled, linear Rec. 709"),
-        Field("luminance", "real", 0, "of that"),
+        Field(
+            "sampled", "int", 0, "1: along paths it is sampled as lights are, and shines the same everywhere"
+        ),
+        Field("radiance", "real", 3, "of one that is sampled, linear Rec. 709; 1 of what is sought"),
+        Field("luminance", "real", 0, "about that of what it shines with"),
+        Field("thing", "int", 0, "of one that shines: its number, 0 is the set"),
+        Field("sought", "int", 0, "of one that shines: 1: its light is looked up where a ray to it ends"),
+        Field("convex", "int", 0, "of one that shines: 1: no place of it sees another"),
         Field("sides", "real", 3, "of a solid: how far its sides are from its middle, scene units"),
         Field("form", "real", 3, "of a shape: numbers of its own"),
         Field("spans", "int", 0, "in how many parts a line can be inside of it"),
@@ -97,42 +118,56 @@ def object_defines(scene: Scene) -> dict[str, object]:
 
 
 def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> Record:
-    """The objects in their order; one unused record where there are none, since no buffer is empty.
+    """The objects in their order, and behind them what shines, in that of `shining_of`.
+
+    One unused record where there are none, since no buffer is empty.
 
     Args:
         grids_begin: the number of the tables at which the volumes' grids begin.
     """
-    if not scene.objects:
+    if not scene.objects and not emitters_of(scene):
         return np.zeros(1, OBJECT.dtype(precision))
     grids = ObjectGrids(scene)
-    numbers = MappedMaterials(scene).blends.roots[1:]
-    glass = glass_bodies(scene)[1:]
+    numbers = MappedMaterials(scene).object_numbers
+    glass, bodies = glass_bodies(scene)[1:], set_bodies(scene).parts
     through_all = [is_glass(each, scene.materials) for each in used_materials(scene)[1:]]
     rows: list[dict[str, object]] = [
         {
             "material": number,
+            "body": index,
             "glass": int(through) and (1 if clear else 2),
+            "bends": bends,
+            "shot": int(is_shot(each)),
             **_place(scene, each),
             **_phong_material(scene, each),
             **_sampled(radiance),
             "colored": int(_has_color(scene, each)),
             **(grids.fields(name, grids_begin) if isinstance(each, VolumeObject) else NO_GRID),
         }
-        for number, through, clear, radiance, (name, each) in zip(
-            numbers, glass, through_all, sampled_radiance(scene), scene.objects.items(), strict=True
+        for index, number, through, clear, bends, radiance, (name, each) in zip(
+            range(1, 1 + len(scene.objects)),
+            numbers,
+            glass,
+            through_all,
+            clear_bodies(scene),
+            sampled_radiance(scene),
+            scene.objects.items(),
+            strict=True,
         )
     ]
     for row, name in zip(rows, scene.objects, strict=True):
-        if name in scene.joined:  # the march finds it, and one body of glass is all of the set
-            row |= {"kind": OBJECT_KINDS["joined"], "glass": 0}
-    return OBJECT.array(precision, rows)
+        if name in scene.joined:  # the march finds it, and where it is glass
+            row |= {"kind": OBJECT_KINDS["joined"], "glass": 0, "body": bodies[name] or -1}
+    found = OBJECT.array(precision, rows)
+    return np.concatenate([found, shining_records(scene, found)])
 
 
 def _sampled(radiance: Vector | None) -> dict[str, object]:
-    """What `kernels/shading/emitters.h` reads, but for its place."""
+    """What a thing shines with, and nothing else of `emitters_of`."""
     shines = radiance or (0.0, 0.0, 0.0)
-    luminance = float(np.dot(shines, (0.2126, 0.7152, 0.0722)))  # ITU-R BT.709-6, item 3.2
-    return {"sampled": int(radiance is not None), "radiance": shines, "luminance": luminance}
+    known = int(radiance is not None)
+    shining = {"sampled": known, "radiance": shines, "luminance": luminance_of(shines)}
+    return {**shining, **dict.fromkeys(("thing", "sought", "convex"), 0)}
 
 
 def mirrors(scene: Scene) -> bool:

@@ -10,12 +10,14 @@ import numpy.typing as npt
 
 from clfractal.device.orbit import Record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.geometry.faces import FACES
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.cut_plane import CutPlane, CutPlaneRenderer, EscapeColors
 from clfractal.scene.model import Scene
 from clfractal.scene.rectangle import Placed, moved
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shading.escape_colors import ESCAPE_COLORS, escape_colors_values, escape_palette
+from clfractal.shading.maps import MappedMaterials
 
 CUT_PLANE = Struct(
     "CutPlane",
@@ -32,11 +34,13 @@ CUT_PLANE = Struct(
         Field("zoom_origin", "real", 3, "scene units"),
         Field("cut", "int", 0, "1: the part of the set in front is removed"),
         Field("objects", "int", 2, "a bit for each object: that of one beside the set is removed likewise"),
+        Field("material", "int", 0, "the number of its faces' material along paths; -1: they are matt"),
         Field("smooth", "int", 0, "1: smooth counts"),
         Field("periodicity", "int", 0, "1: orbits that come back are found early"),
         Field("iterations", "int", 0, "most applications of the formula"),
         *ESCAPE_COLORS,
     ],
+    kinds=[("FACES", FACES)],
 )
 
 
@@ -60,6 +64,7 @@ def has_faces(scene: Scene) -> bool:
 def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
     """The planes, one record each."""
     zoom, origin = zoom_of(scene)
+    materials = MappedMaterials(scene).face_numbers
     rows = [
         {
             **_shown(placed, plane.colors, _iterations(scene, plane)),
@@ -69,6 +74,7 @@ def plane_records(scene: Scene, precision: Precision) -> npt.NDArray[Any]:
             "zoom_origin": origin,
             "cut": int(plane.cuts_set),
             "objects": _cut_objects(scene, plane),
+            "material": materials.get(plane.material or "", -1),
         }
         for plane, placed in all_planes(scene)
     ]
@@ -84,6 +90,7 @@ def only_plane(renderer: CutPlaneRenderer, iterations: int, precision: Precision
         "zoom_origin": (0, 0, 0),
         "cut": 0,
         "objects": (0, 0),
+        "material": -1,
     }
     shown = _shown(renderer.plane.placed, renderer.colors, iterations)
     return CUT_PLANE.array(precision, [{**shown, **alone, "periodicity": int(renderer.periodicity)}])

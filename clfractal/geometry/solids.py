@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
-from clfractal.device.orbit import JOINS, SOLID_KINDS, Record, orbit_record
+from clfractal.device.orbit import BODY_OPAQUE, JOINS, SOLID_KINDS, Record, orbit_record
 from clfractal.device.structs import Precision
 from clfractal.formulas.language import Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.formulas.together import write_together
+from clfractal.geometry.faces import face_number, opening_planes
 from clfractal.scene.checks import used_boxes
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject, ball_of_both
@@ -21,6 +22,7 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.base import frame_of, length
 from clfractal.schema.shape import Ball, Joined, Level, ObjectBase, Simple, Solid, turned_axes
+from clfractal.shading.set_bodies import joins_smoothly, set_bodies
 
 # Around a formula's ball, in its radii: here it has a gradient and a count, for light is computed before surfaces.
 _BESIDE = 0.5
@@ -94,17 +96,12 @@ class Body:
 
 def _turns(chains: Sequence[Chain]) -> dict[str, int]:
     """What texts that look for orbits that came back depend on: one set for all formulas of a program."""
-    cycle = math.lcm(*(chain.cycle_length for chain in chains))
+    cycle = math.lcm(*(chain.period for chain in chains))
     return {
         "CHUNK": cycle * -(-_CHUNK // cycle),
         "PERIOD_CHECK": cycle * max(1, _PERIOD_CHECK // cycle),
         "REPEATS_FROM": max(chain.repeats_from for chain in chains),
     }
-
-
-def joins_smoothly(scene: Scene) -> bool:
-    """Whether anything flows into the set."""
-    return any(each.join == "smooth_union" for each in scene.joined.values())
 
 
 def has_hollows(scene: Scene) -> bool:
@@ -121,7 +118,11 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
     radius = min(scene.bounds[1], scene.formula_bounds[1])
     together = write_together(_chains(scene))
     formulas = iter(zip(together.formulas, together.firsts, strict=True))
-    of_all = {"solids": 1 + len(scene.joined), "flows": int(joins_smoothly(scene))}
+    flows, bodies = {"flows": int(joins_smoothly(scene))}, set_bodies(scene)
+
+    def body(number: int) -> int:
+        """Of a set of several bodies what is no body has a number, too."""
+        return number or (BODY_OPAQUE if bodies.several else 0)
 
     def formula(chain: Chain, scale: float, ball: Ball) -> dict[str, object]:
         written, first = next(formulas)
@@ -141,14 +142,16 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
             "potential_share": min(ball[1], scale * chain.radius) / radius,
         }
 
-    first = {**of_all, **formula(scene.chain, 1.0, _ball(scene))}
-    found = [orbit_record(scene.chain, iterations, precision, potential=potential, joined=first)]
+    first = {**flows, "body": body(bodies.own), **formula(scene.chain, 1.0, _ball(scene))}
+    found: list[_Part] = [_Part(scene.chain, iterations, first)]
     objects = list(scene.objects)
     for name, each in scene.joined.items():
         part: dict[str, object] = {
-            **of_all,
+            **flows,
             "object": 1 + objects.index(name),
             "join": JOINS[each.join],
+            "body": body(bodies.parts[name]) if each.join in ("union", "smooth_union") else 0,
+            "bare": int(bodies.several),
             "smoothness": each.smoothness,
         }
         part |= {"middle": each.position, **_axes(each)}
@@ -159,8 +162,69 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
         else:
             assert isinstance(each, Simple)
             part |= {"kind": SOLID_KINDS[each.tag], "form": each.form, "step_scale": 1.0}
-        found.append(orbit_record(chain, limit, precision, potential=potential, joined=part))
+        found.append(_Part(chain, limit, part, _opening(scene, name)))
+    lists = [found]
+    if bodies.several:
+        lists += _lists_of_bodies(found)
+    records: list[_Part] = []
+    for number, each_list in enumerate(lists):
+        more = _one_list(each_list, scene.chain, iterations)
+        more[0].record["next_list"] = len(more) if number + 1 < len(lists) else 0
+        records += more
+    return [
+        orbit_record(each.chain, each.iterations, precision, potential=potential, joined=each.record)
+        for each in records
+    ]
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """A solid of a list: its record, and those of the planes that open it alone."""
+
+    chain: Chain
+    iterations: int
+    record: dict[str, object]
+    openings: Sequence[dict[str, object]] = ()
+
+
+def _lists_of_bodies(parts: Sequence[_Part]) -> list[list[_Part]]:
+    """Of each body, and of all that is opaque, what is added to it, and what cuts that."""
+    added = JOINS["union"]
+    numbers = dict.fromkeys(each.record["body"] for each in parts if each.record.get("join", added) == added)
+    found = []
+    for number in numbers:
+        own = [each for each in parts if each.record["body"] in (number, 0)]
+        while own[0].record["body"] == 0:
+            del own[0]
+        found.append(own)
     return found
+
+
+def _one_list(parts: Sequence[_Part], chain: Chain, iterations: int) -> list[_Part]:
+    """The records of solids that are asked as one: behind them stand those of the planes."""
+    found = [replace(each, record={**each.record, "solids": len(parts)}) for each in parts]
+    end = len(found)
+    for number, each in enumerate(parts):
+        found[number].record.update(planes=len(each.openings), first_plane=end - number)
+        end += len(each.openings)
+    return found + [_Part(chain, iterations, dict(record)) for each in parts for record in each.openings]
+
+
+def _opening(scene: Scene, name: str) -> list[dict[str, object]]:
+    """The planes that open one part alone: solids of which it is within. (What fills grids has no planes.)"""
+    if not isinstance(scene.renderer, SurfaceRenderer):
+        return []
+    thing = 1 + list(scene.objects).index(name)
+    return [
+        {
+            "kind": SOLID_KINDS["plane"],
+            "object": face_number(number, thing),
+            "middle": placed.center,
+            "sides": [1.0, 1.0, 1.0],
+            **_along(frame_of(placed.normal)),
+        }
+        for number, placed in opening_planes(scene, name)
+    ]
 
 
 def _by_potential(scene: Scene) -> bool:
@@ -199,4 +263,8 @@ def _axes(each: Joined) -> dict[str, object]:
         sides = [1.0, 1.0, 1.0]
     else:
         axes, sides = own_axes(each)
-    return {"sides": sides, **dict(zip(("own_x", "own_y", "own_z"), axes, strict=True))}
+    return {"sides": sides, **_along(axes)}
+
+
+def _along(axes: Sequence[npt.ArrayLike]) -> dict[str, object]:
+    return dict(zip(("own_x", "own_y", "own_z"), axes, strict=True))

@@ -15,14 +15,23 @@ from clfractal.geometry.planes import plane_count
 from clfractal.geometry.solids import has_hollows
 from clfractal.integrators.records import bounces, environment_weight, firefly_limit, hemisphere_rays
 from clfractal.integrators.state import PARTS, along_paths, normal_count
-from clfractal.integrators.waves import meets_objects, met_numbers
+from clfractal.integrators.waves import chain_rays, meets_objects, met_numbers
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.shading.emitters import sampled_radiance
+from clfractal.shading.air_lights import air_fields
+from clfractal.shading.emitter_tree import emitter_fields
+from clfractal.shading.emitters import emitters_of, seeks_light
 from clfractal.shading.environment import PackedEnvironment
 from clfractal.shading.kind_numbers import FEATURES, NORMALS
-from clfractal.shading.light_records import light_rays, single_lights
+from clfractal.shading.light_records import (
+    ball_tree_begins,
+    emitter_tree_begins,
+    light_rays,
+    tree_begins,
+)
+from clfractal.shading.light_tree import single_lights, tree_fields
 from clfractal.shading.maps import has_bump, has_glass, has_glass_set, has_subsurface, material_counts
+from clfractal.shading.set_bodies import set_bodies
 from clfractal.shading.set_lights import SetLights, march_fields
 
 MARCH = Struct(
@@ -75,8 +84,28 @@ MARCH = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("environment_weight", "real", 0, "about the irradiance that the environment brings"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("single_lights", "int", 0, "of these, beside the tree of lamps"),
+        Field("tree_nodes", "int", 0, "nodes of that tree"),
+        Field("light_tree", "int", 0, "where it begins among the tables"),
+        Field("air_sun", "int", 0, "1: the sun of a sky shines into fog"),
+        Field("air_others", "int", 0, "1: so do others than single lights"),
+        Field("ball_nodes", "int", 0, "nodes of a tree of the balls on the set"),
+        Field("ball_tree", "int", 0, "where it begins among the tables"),
         Field("object_count", "int", 0, "number of objects"),
+        Field("set_body", "int", 0, "the number of the body of the scene's own formula; -1: it is opaque"),
+        Field("eye_body", "int", 0, "the number of the body of the set that the eye is in; 0: none"),
+        Field(
+            "first_skin",
+            "int",
+            0,
+            "of several bodies of the set the first that light only goes below; else 0",
+        ),
+        Field("emitter_count", "int", 0, "of things that shine; they stand behind the objects"),
+        Field("single_emitters", "int", 0, "of these, beside their tree"),
+        Field("emitter_nodes", "int", 0, "nodes of that tree"),
+        Field("emitter_tree", "int", 0, "where it begins among the tables"),
         Field("meets_objects", "int", 0, "1: rays meet objects beside the set"),
+        Field("chain_rays", "int", 0, "rays of light that boundaries of clear bodies bend"),
         Field("met_numbers", "int", 0, "numbers that are kept of what a ray met"),
         Field("plane_count", "int", 0, "number of cut planes in the picture"),
         Field("light_rays", "int", 0, "most shadow rays that a light has"),
@@ -141,7 +170,8 @@ def features_of(scene: Scene) -> int:
         "fog": scene.fog is not None,
         "bump": has_bump(scene),
         "paths": along_paths(scene),
-        "emitters": any(each is not None for each in sampled_radiance(scene)),
+        "emitters": bool(emitters_of(scene)),
+        "sought": seeks_light(scene),
         "shining_clouds": any(each.transfer.emission is not None for each in clouds_of(scene)),
         "glass": has_glass(scene),
         "glass_set": has_glass_set(scene),
@@ -173,7 +203,9 @@ def march_record(
     environment: PackedEnvironment | None = None,
     on_set: SetLights | None = None,
     places: Sequence[int] | None = None,
+    tables: int = 0,
     *,
+    eye_body: int = 0,
     counts_waits: bool = False,
 ) -> Record:
     """The settings of the march, and of the rays that a sample sends.
@@ -182,9 +214,11 @@ def march_record(
 
     Args:
         places: where what a pixel carries is kept, see `state_places`.
+        tables: the number of the tables at which those of lights begin.
+        eye_body: the number of the body of the set that the eye is in, or 0.
         counts_waits: whether the statistic `orbit_waits` is counted; else it is 0.
     """
-    renderer = scene.surface
+    renderer, bodies = scene.surface, set_bodies(scene)
     center, radius = scene.bounds
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
     half = radius / 2
@@ -232,10 +266,16 @@ def march_record(
         "bounces": bounces(scene),
         "roulette": scene.lighting.roulette if isinstance(scene.lighting, PathLighting) else 0,
         "environment_weight": environment_weight(scene, environment),
-        "light_count": len(single_lights(scene)),
+        **tree_fields(scene, tables + tree_begins(scene)),
+        **air_fields(scene, tables + ball_tree_begins(scene)),
         **march_fields(on_set),
         "object_count": len(scene.objects),
+        "set_body": bodies.own or -1,
+        "first_skin": bodies.first_skin,
+        "eye_body": eye_body,
+        **emitter_fields(scene, tables + emitter_tree_begins(scene)),
         "meets_objects": int(meets_objects(scene)),
+        "chain_rays": chain_rays(scene),
         "met_numbers": met_numbers(scene),
         "plane_count": plane_count(scene),
         "light_rays": light_rays(scene),

@@ -132,6 +132,13 @@ PATH = _struct(
     ("color", "through", "part of what comes next that reaches the eye"),
     ("color", "seen", "light so far"),
 )
+SOUGHT = _struct(
+    "sought",
+    "Light that a ray seeks, of which is known what it brings once it is known what the ray meets.",
+    ("real", "thing", "1 + the number of the thing that has to be met; 0: none"),
+    ("color", "brings", "of a light of 1"),
+    ("color", "extinction", "of what the ray goes through, per unit of the way"),
+)
 LIGHT_BEFORE = _struct(
     "light_before",
     "A light that is seen before an interaction.",
@@ -173,6 +180,22 @@ HALT = _struct(
     ("real", "halted", "which kind of medium has, see state.h; or 0"),
     ("real", "anisotropy", "of a cloud, Henyey and Greenstein's g"),
     ("real", "far", "after interactions: how far the shadow ray goes; below 0: there is none"),
+    ("real", "passed", "how far along the path's ray no cloud scatters it, as a walk has found out"),
+    ("real", "turns", "how many bounces the path has had in walks, beside those of the stages"),
+)
+BENT = _struct(
+    "bent",
+    "How a path has come through one clear body, since it was scattered last by what is no glass; and what light awaits"
+    " that comes so.",
+    ("vec", "from", "where that was"),
+    ("vec", "toward", "and in which direction it set out there ..."),
+    ("real", "density", "... chosen with which density, per steradian ..."),
+    ("real", "total", "... where all lights weighed so much"),
+    ("real", "start", "what it was in there, as `medium` in path_state"),
+    ("real", "medium", "and what it was in before the present interaction"),
+    ("real", "crossed", "boundaries of the body since; below 0: it has come otherwise"),
+    ("real", "body", "the number of the body at whose boundary it is, or 0"),
+    ("color", "awaited", "what one light brings through a clear body, if nothing is in the way of its rays"),
 )
 
 
@@ -282,6 +305,8 @@ TYPES = (
     PATH,
     PATH_STATE,
     HALT,
+    BENT,
+    SOUGHT,
     LIGHT_BEFORE,
     FACE,
     LAYERS,

@@ -45,6 +45,7 @@ class Plan:
             in these.
         offset: to the right and down, pixels of the picture by which those of a coarse one are moved.
         moving: whether the view moves while the picture is taken.
+        eye_body: the number of the body of the set that the eye is in, see `eye_body`.
     """
 
     precision: Precision
@@ -55,6 +56,7 @@ class Plan:
     divider: int = 1
     moving: bool = False
     offset: tuple[float, float] = (0.0, 0.0)
+    eye_body: int = 0
 
     @property
     def first(self) -> tuple[float, float]:

@@ -14,6 +14,7 @@ from clfractal.geometry.planes import has_faces
 from clfractal.integrators.passes import has_cryptomatte, has_parts
 from clfractal.integrators.path_state import (
     AOVS,
+    BENT,
     COUNTERS,
     CRYPTOMATTE,
     DIRECT_LIGHT,
@@ -32,6 +33,7 @@ from clfractal.integrators.path_state import (
     PIXEL,
     RELIEF,
     SIGHTING,
+    SOUGHT,
     START,
     TOUCH,
     WITHIN,
@@ -39,8 +41,8 @@ from clfractal.integrators.path_state import (
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.records import bounces
 from clfractal.integrators.waves import (
-    air_turns,
     finds_materials,
+    has_bent_light,
     has_cones,
     has_lens,
     has_media,
@@ -49,6 +51,8 @@ from clfractal.integrators.waves import (
 )
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
+from clfractal.shading.air_lights import air_turns, wide_air_turns
+from clfractal.shading.emitters import seeks_light
 from clfractal.shading.maps import asked_maps, bump_numbers, has_bump, has_glass, has_participating_media
 from clfractal.shading.materials import matter_numbers
 
@@ -106,10 +110,13 @@ PARTS = (
     Part("WITHIN", WITHIN.numbers, lambda scene, plan: int(has_glass(scene))),
     Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_participating_media(scene))),
     Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
+    Part("BENT", BENT.numbers, lambda scene, plan: int(has_bent_light(scene))),
+    Part("SOUGHT", SOUGHT.numbers, lambda scene, plan: int(seeks_light(scene))),
     # What rays to wide lights have brought, and lights that are before the interaction.
     Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),
     Part("LIGHT_BEFORE", LIGHT_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),
-    Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0)),
+    # The sum, and what is awaited of turns whose light has a colour of its own.
+    Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0) + wide_air_turns(scene)),
     Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
     # What the formula was asked for the present interaction's material; and the same around it, with the normal and escape
     # count there, for the slopes of its material's relief (`kernels/shading/bump_places.h`).

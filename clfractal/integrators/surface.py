@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.geometry.eye_body import eye_body
 from clfractal.geometry.object_grids import ObjectGrids
 from clfractal.geometry.objects import object_defines, object_records
 from clfractal.geometry.planes import CUT_PLANE, plane_palettes, plane_records
 from clfractal.geometry.solids import Body
 from clfractal.integrators import records
 from clfractal.integrators.declarations import struct_text
+from clfractal.integrators.kept import Resources
 from clfractal.integrators.kernel import (
     LANE_SHARE,
     OBJECT_NUMBERS,
@@ -31,7 +33,7 @@ from clfractal.integrators.kernel import (
 from clfractal.integrators.march import march_record
 from clfractal.integrators.passes import pass_defines
 from clfractal.integrators.path_state import path_state_text
-from clfractal.integrators.plan import Plan
+from clfractal.integrators.plan import Plan, PlannedView
 from clfractal.integrators.state import state_numbers, state_places, state_text
 from clfractal.integrators.waves import (
     OF_SINGLE_LANES,
@@ -44,7 +46,12 @@ from clfractal.integrators.waves import (
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.shading.environment import packed_map
-from clfractal.shading.light_records import light_records, light_tables, tables_key
+from clfractal.shading.light_records import (
+    has_tables,
+    light_records,
+    light_tables,
+    tables_key,
+)
 from clfractal.shading.maps import MAP, MAP_DEFINES, MappedMaterials, has_glass, mapped_materials
 from clfractal.shading.materials import PBR, pbr_text, scattering_defines, weighed_text
 from clfractal.shading.scattering import albedo_tables, glass_tables
@@ -82,6 +89,11 @@ class SurfaceKernel(TileKernel):
     name = "surface"
     waves = True
 
+    def __init__(self, view: PlannedView, resources: Resources) -> None:
+        super().__init__(view, resources)
+        x, y, z = map(float, view.camera.origin)
+        self.plan = replace(self.plan, eye_body=eye_body(self.scene, (x, y, z)))
+
     def texts(self) -> list[ProgramText]:
         return program_texts(self.scene, self.plan)
 
@@ -116,6 +128,8 @@ class SurfaceKernel(TileKernel):
                 packed,
                 on_set,
                 state_places(scene, self.plan),
+                before,
+                eye_body=self.plan.eye_body,
                 counts_waits=self.resources.counts_waits,
             ),
             body.records(precision),
@@ -159,7 +173,7 @@ class SurfaceKernel(TileKernel):
             key = f"{grids.key} {'' if found is None else found.key}"
             tables = once(key, lambda: np.concatenate([of_maps, grids.data()]))
         before = tables
-        if self.scene.light_tables:
+        if has_tables(self.scene):
             key = f"{key} {tables_key(self.scene)}"
             tables = once(key, lambda: np.concatenate([before, light_tables(self.scene)]))
         return of_maps.size, before.size, tables if tables.size else np.zeros(4, np.float32)
@@ -225,7 +239,16 @@ PROGRAMS = (
     _Program("scatter", "integrators/scatter_paths.cl", ("scatter_paths",), path_defines),
     _Program("costly", "integrators/scatter_costly.cl", ("scatter_costly",), path_defines),
     _Program("gather", "integrators/gather_paths.cl", ("gather_paths", "end_paths"), path_defines),
-    _Program("media", "integrators/media.cl", ("cross_media", "pass_clouds"), path_defines),
+    _Program("bent", "integrators/bent_light.cl", ("bend_light", "end_bent_light"), path_defines),
+    _Program("bent_shapes", "integrators/bent_shapes.cl", ("bend_shapes", "end_bent_shapes"), path_defines),
+    _Program(
+        "sought",
+        "integrators/sought_light.cl",
+        ("find_sought", "gather_sought", "find_last", "end_sought"),
+        path_defines,
+    ),
+    _Program("media", "integrators/media.cl", ("cross_media",), path_defines),
+    _Program("clouds", "integrators/walk_clouds.cl", ("walk_clouds", "pass_clouds"), path_defines),
     _Program(
         "glass",
         "integrators/march/glass.cl",

@@ -30,7 +30,14 @@ from clfractal.scene.sampled import Sampled
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shading.environment import PackedEnvironment, packed_map
 from clfractal.shading.kind_numbers import kind_text
-from clfractal.shading.light_records import LIGHT, light_records, light_tables, tables_key
+from clfractal.shading.light_records import (
+    LIGHT,
+    light_records,
+    light_tables,
+    tables_key,
+    tree_begins,
+)
+from clfractal.shading.light_tree import tree_fields
 from clfractal.shading.transfer import (
     MOST_OPACITY,
     SHINING_RATE,
@@ -93,6 +100,9 @@ VOLUME = Struct(
         Field("roulette", "int", 0, "bounces after which Russian roulette ends paths"),
         Field("max_steps", "int", 0, "most places of a ray"),
         Field("light_count", "int", 0, "number of lights"),
+        Field("single_lights", "int", 0, "of these, beside the tree of lamps"),
+        Field("tree_nodes", "int", 0, "nodes of that tree"),
+        Field("light_tree", "int", 0, "where it begins among the tables"),
         Field("plane_count", "int", 0, "number of cut planes"),
         Field("shadows", "int", 0, "1: some light is blocked by the grid"),
         Field("shines", "int", 0, "1: the grid adds light by itself"),
@@ -242,9 +252,8 @@ class VolumeKernel(TileKernel):
 
     def _light_tables(self) -> npt.NDArray[np.float32]:
         """What lights have read; without such lights a stand-in."""
-        if not self.scene.light_tables:
-            return np.zeros(1, np.float32)
-        return self.resources.once(tables_key(self.scene), lambda: light_tables(self.scene))
+        found = self.resources.once(tables_key(self.scene), lambda: light_tables(self.scene))
+        return found if found.size else np.zeros(1, np.float32)
 
     @cached_property
     def _grid_key(self) -> str:
@@ -350,7 +359,7 @@ def volume_record(
         "shadow_lift": SHADOW_LIFT * voxel,
         **_path_fields(scene, environment),
         "max_steps": int(np.ceil(longest / step)) + 2,
-        "light_count": len(scene.lights),
+        **tree_fields(scene, tree_begins(scene)),
         "plane_count": plane_count(scene),
         "shadows": int(settings.shadows and any(light.shadow for light in scene.lights)),
         "shines": int(settings.transfer.emission is not None),

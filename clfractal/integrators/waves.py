@@ -18,8 +18,13 @@ but for the points. With `lighting.mode: path` in the place of the last two
 ask for light and send the next ray of each path (`march_inside`, or `walk_inside` with glass that scatters light, takes
 those within to where they leave the set), and after the last bounce `march  end_paths` finds out which rays leave the set.
 `scatter_costly` takes the place of `scatter_paths` where materials have parts such as films, whose registers others need
-not pay for. With media that scatter light `cross_media` stands before both and before
-`end_paths`, and with clouds `pass_clouds` after the former. See docs/engineering/stages.md.
+not pay for. With media that scatter light `cross_media` stands before both and before `end_paths`, and with clouds
+`walk_clouds` and `pass_clouds` after the former; with clear water or balls `bend_light` before the former, and
+`end_bent_light` before the latter (`bend_shapes` and `end_bent_shapes` where clear bodies have other shapes, too).
+Light that is sought has rays of its own, which are marched to what they meet, and
+`find_sought  [color_interactions]  [find_materials]  gather_sought` before `gather_paths`; last rays look for what they
+meet then, and `find_last  [color_interactions]  [find_materials]  end_sought` stand before `end_paths`. See
+docs/engineering/stages.md.
 """
 
 from __future__ import annotations
@@ -29,14 +34,17 @@ from collections.abc import Iterator
 from clfractal.elements.lights.set import SetLight
 from clfractal.geometry.object_grids import clouds_of
 from clfractal.geometry.planes import has_faces
-from clfractal.geometry.solids import joins_smoothly
 from clfractal.integrators.kernel import MET_NUMBERS, Over, Stage
 from clfractal.integrators.plan import Plan
 from clfractal.integrators.records import bounces, hemisphere_rays
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
-from clfractal.shading.light_records import light_rays, single_lights
+from clfractal.shading.air_lights import air_turns
+from clfractal.shading.clear_bodies import clear_bodies, has_shot_bodies
+from clfractal.shading.emitters import sampled_radiance, seeks_light
+from clfractal.shading.light_records import light_rays
+from clfractal.shading.light_tree import single_lights
 from clfractal.shading.maps import (
     MappedMaterials,
     asked_maps,
@@ -45,6 +53,7 @@ from clfractal.shading.maps import (
     has_glass_set,
     has_participating_media,
 )
+from clfractal.shading.set_bodies import joins_smoothly, set_bodies
 
 # What a march is after, as in `kernels/integrators/march/rays.h`.
 GOALS = ("surface", "shadow", "touch", "point", "cone")
@@ -95,6 +104,22 @@ def has_media(scene: Scene) -> bool:
     return has_participating_media(scene) or (along_paths and bool(clouds_of(scene)))
 
 
+def has_bent_light(scene: Scene) -> bool:
+    """Whether lights are sampled through smooth boundaries: those that paths may hardly meet by chance; a sky's sun, too.
+
+    Clouds would dim such light on its way, which nothing asks for, and lights without shadows go through all things.
+    """
+    sun = scene.environment is not None and scene.environment.has_sun
+    small = bool(scene.lights) or sun or any(each is not None for each in sampled_radiance(scene))
+    shadows = all(light.shadow for light in scene.lights)
+    return any(clear_bodies(scene)) and small and shadows and not clouds_of(scene)
+
+
+def chain_rays(scene: Scene) -> int:
+    """Rays of light that the boundaries of a clear body bend: one more than these (`kernels/integrators/chains.h`)."""
+    return 1 + max(clear_bodies(scene), default=0)
+
+
 def finds_materials(scene: Scene) -> bool:
     """Whether materials of interactions differ from place to place, or parts of several are mixed: else each thing has
     its own.
@@ -106,7 +131,7 @@ def finds_materials(scene: Scene) -> bool:
 
 def met_numbers(scene: Scene) -> int:
     """Numbers that are kept of what a ray met (`kernels/integrators/march/queue.h`)."""
-    return MET_NUMBERS + bool(scene.joined) + 2 * joins_smoothly(scene)
+    return MET_NUMBERS + bool(scene.joined) + 2 * (joins_smoothly(scene) or set_bodies(scene).several)
 
 
 def light_turns(scene: Scene) -> int:
@@ -133,17 +158,12 @@ def has_wide_lights(scene: Scene) -> bool:
     return rays.cosine + rays.map > 0 or any(light.has_size for light in scene.lights)
 
 
-def air_turns(scene: Scene) -> int:
-    """Rays that leave the fog before the first interaction: one to each light."""
-    fog = scene.fog
-    return (
-        len(single_lights(scene)) if fog is not None and fog.scattering is not None and fog.density > 0 else 0
-    )
-
-
 def most_turns(scene: Scene) -> int:
     """The most rays that a pixel sends for one purpose."""
     after = max(light_turns(scene), 1) + air_turns(scene)
+    if has_bent_light(scene):
+        after += chain_rays(scene)
+    after += seeks_light(scene)
     # A path that is within a set of glass has a ray of another kind.
     return max(scene.surface.used_points.count, after, 1 + int(has_glass_set(scene)))
 
@@ -152,6 +172,7 @@ def most_turns(scene: Scene) -> int:
 OVER: dict[str, Over] = {
     "scatter_paths": "shares of pixels",
     "scatter_costly": "shares of pixels",
+    "walk_clouds": "shares of pixels",
     "march_rays": "rays",
     "march_points": "rays",
     "step_rays": "rays",
@@ -219,7 +240,7 @@ def surface_stages(scene: Scene, plan: Plan, samples: tuple[int, int]) -> Iterat
 def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[Stage]:
     marching, last = march_kernels(scene, plan), bounces(scene)
     points, after = scene.surface.used_points.count, light_turns(scene)
-    paths, faces = isinstance(scene.lighting, PathLighting), has_faces(scene)
+    paths, faces, seeks = isinstance(scene.lighting, PathLighting), has_faces(scene), seeks_light(scene)
 
     def stage(kernel: str, turns: int = 0, **numbers: int) -> Stage:
         return Stage(kernel, OVER.get(kernel, "pixels"), turns, {"sample": sample, **numbers})
@@ -227,13 +248,21 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
     def when(wanted: object, *stages: Stage) -> tuple[Stage, ...]:
         return stages if wanted else ()
 
-    def objects(kernel: str, turns: int) -> tuple[Stage, ...]:
+    def objects(kernel: str, turns: int, first: int = 0) -> tuple[Stage, ...]:
         """What stands beside the set, where there is anything."""
-        return when(meets_objects(scene), Stage(kernel, OVER[kernel], turns))
+        return when(meets_objects(scene), Stage(kernel, OVER[kernel], turns, {"next_turns": first}))
+
+    def asked_formula(of: int, turn: int = 0) -> tuple[Stage, ...]:
+        """What the formula is asked for an interaction, which rays of that turn have found."""
+        return when(asks_formula(scene), stage("color_interactions", bounce=of, next_turns=turn))
+
+    def asked_material(of: int, turn: int = 0) -> tuple[Stage, ...]:
+        """What its material is, likewise."""
+        return when(finds_materials(scene), stage("find_materials", bounce=of, next_turns=turn))
 
     yield stage("begin_samples", int(cones))
     for bounce in range(last + 1):
-        within = bounce > 0 and has_glass_set(scene)
+        within = has_glass_set(scene) and (bounce > 0 or plan.eye_body > 0)
         of_points = points > 1 and bounce == 0
         turns = points if of_points else 1
         # (Of a pixel with points only a face asks whether an object is before it.)
@@ -257,19 +286,40 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         air = air_turns(scene) if bounce == 0 else 0
         # Behind the rays for light.
         yield from when(air, stage("send_air", next_turns=1 if paths else after))
-        yield from when(asks_formula(scene), stage("color_interactions", bounce=bounce))
+        yield from asked_formula(bounce)
         yield from when(scene.cut_planes and bounce == 0 and not paths, stage("find_planes"))
         yield from when(scene.glow is not None, stage("add_glow", bounce=bounce))
         if paths:
             yield from when(has_media(scene), stage("cross_media", 1, bounce=bounce))
-            yield from when(finds_materials(scene), stage("find_materials", bounce=bounce))
-            yield stage("scatter_costly" if has_costly(scene) else "scatter_paths", 1, bounce=bounce)
-            yield from when(clouds_of(scene), stage("pass_clouds", bounce=bounce))
+            yield from asked_material(bounce)
+            bent = chain_rays(scene) if has_bent_light(scene) else 0
+            last_turn = 1 + air + bent
+            yield from when(
+                bent,
+                stage(
+                    "bend_shapes" if has_shot_bodies(scene) else "bend_light",
+                    bounce=bounce,
+                    next_turns=1 + air,
+                ),
+            )
+            scatter = "scatter_costly" if has_costly(scene) else "scatter_paths"
+            yield stage(scatter, 1, bounce=bounce, next_turns=last_turn)
+            yield from when(
+                clouds_of(scene), stage("walk_clouds", 1, bounce=bounce), stage("pass_clouds", bounce=bounce)
+            )
             yield from when(scene.cut_planes and bounce == 0, stage("find_planes"))
-            yield from objects("meet_objects", 1 + air)
-            yield from _marched(marching, 1 + air, GOAL_SHADOW)
+            yield from objects("meet_objects", last_turn)
+            yield from _marched(marching, last_turn, GOAL_SHADOW)
             yield from when(air, stage("gather_air", 1 + air, next_turns=1))
-            yield stage("gather_paths", 1 + air, bounce=bounce)
+            if seeks:
+                yield from objects("meet_objects", 1, last_turn)
+                yield from _marched(marching, 1, GOAL_SURFACE, first=last_turn)
+                yield from objects("look_at_objects", 1, last_turn)
+                yield stage("find_sought", 1, bounce=bounce, next_turns=last_turn)
+                # (It stands where interactions after the first one do.)
+                yield from (*asked_formula(1, last_turn), *asked_material(1, last_turn))
+                yield stage("gather_sought", 1, bounce=bounce, next_turns=last_turn)
+            yield stage("gather_paths", 1 + air, bounce=bounce, next_turns=1 + air)
             continue
         if after + air > 0:
             yield from objects("meet_objects", after + air)
@@ -280,14 +330,25 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield stage("light_interactions", after + air, bounce=bounce)
     if paths:
         yield from objects("meet_objects", 1)
-        yield from _marched(marching, 1, GOAL_SHADOW)
+        yield from _marched(marching, 1, GOAL_SURFACE if seeks else GOAL_SHADOW)
         yield from when(has_media(scene), stage("cross_media", 1, bounce=last + 1))
+        if seeks:
+            yield from objects("look_at_objects", 1)
+            yield stage("find_last", 1, bounce=last + 1)
+            yield from (*asked_formula(last + 1), *asked_material(last + 1))
+        ends = "end_bent_shapes" if has_shot_bodies(scene) else "end_bent_light"
+        yield from when(has_bent_light(scene), stage(ends, 1, bounce=last + 1))
+        yield from when(seeks, stage("end_sought", 1, bounce=last + 1))
         yield stage("end_paths", 1, bounce=last + 1)
 
 
-def _marched(kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0) -> Iterator[Stage]:
+def _marched(
+    kernels: tuple[str, ...], turns: int, goal: int, bounce: int = 0, first: int = 0
+) -> Iterator[Stage]:
+    """The march of so many turns from the first one on."""
     if not kernels:
         return
-    yield Stage(kernels[0], OVER[kernels[0]], turns, {"goal": goal, "bounce": bounce})
+    numbers = {"goal": goal, "bounce": bounce, "next_turns": first}
+    yield Stage(kernels[0], OVER[kernels[0]], turns, numbers)
     if len(kernels) > 1 and goal in (GOAL_SURFACE, GOAL_POINT):
-        yield Stage(kernels[1], OVER[kernels[1]], turns)
+        yield Stage(kernels[1], OVER[kernels[1]], turns, {"next_turns": first})

@@ -9,7 +9,7 @@ from pathlib import Path
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
 from clfractal.files.inputs import note
-from clfractal.formulas.catalog import safe_path
+from clfractal.formulas.own import safe_path
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """Checks that concern several parts of a scene, made once the formula and its bounds are known."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from math import dist
 from operator import and_, gt, or_
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ from clfractal.files.channels import (
 from clfractal.scene.alone import check_alone
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.lighting import MAX_ASKED
 from clfractal.scene.model import Scene
 from clfractal.scene.object_checks import check_material, check_objects, inside_of
 from clfractal.scene.objects import FormulaObject
@@ -25,6 +26,7 @@ from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 from clfractal.schema.base import Vector
+from clfractal.schema.light import SingleLight
 from clfractal.schema.quantity import colorings
 from clfractal.schema.shape import Simple
 
@@ -287,6 +289,29 @@ def _check_medium(scene: Scene, renderer: VolumeRenderer) -> None:
             )
 
 
+def _check_light_count(scene: Scene) -> None:
+    """Paths choose one of many lights at each place; elsewhere each is asked, and each on the set is searched for."""
+    count = sum(isinstance(light, SingleLight) for light in scene.lights)
+    searched = len(scene.lights) - count
+    far = sum(isinstance(light, SingleLight) and light.stands_at is None for light in scene.lights)
+    if far > MAX_ASKED and isinstance(scene.lighting, PathLighting):
+        raise SceneError(
+            f"must have at most {MAX_ASKED} entries without a position, all of which are asked everywhere, got {far}",
+            Where(path="lights"),
+        )
+    if searched > MAX_ASKED:
+        raise SceneError(
+            f"must have at most {MAX_ASKED} entries of type set, each of which has many balls, got {searched}",
+            Where(path="lights"),
+        )
+    if count > MAX_ASKED and not isinstance(scene.lighting, PathLighting) and not scene.renderer.is_flat:
+        raise SceneError(
+            f"must have at most {MAX_ASKED} entries with lighting.mode direct, where every place asks all of them,"
+            f" got {count}; use lighting: {{mode: path}}",
+            Where(path="lights"),
+        )
+
+
 def _check_lights(scene: Scene) -> None:
     """A grid from a file is not the formula's solid, so there lights may be anywhere."""
     if not scene.has_set or (isinstance(scene.renderer, VolumeRenderer) and scene.renderer.file is not None):
@@ -318,16 +343,26 @@ _JOINED: Mapping[str, Callable[[bool, bool], bool]] = {
 
 def inside_solid(scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS) -> Sequence[bool]:
     """Which points belong to the solid that is drawn; after `most` applications without escape they count as inside."""
-    found = _inside_formula(scene.chain, min(scene.formula.iterations, most), points)
+    (_, found), *more = parts_holding(scene, points, most=most)
+    for name, held in more:
+        found = [_JOINED[scene.joined[name].join](a, b) for a, b in zip(found, held, strict=True)]
+    return found
+
+
+def parts_holding(
+    scene: Scene, points: Sequence[Vector], *, most: int = _MOST_APPLICATIONS
+) -> Iterator[tuple[str, list[bool]]]:
+    """Which points are in each part of the solid, by itself: in the scene's own formula, whose name is "", and in all that
+    is joined to it.
+    """
+    yield "", _inside_formula(scene.chain, min(scene.formula.iterations, most), points)
     for name, each in scene.joined.items():
         if isinstance(each, FormulaObject):
             own = [each.own_place(point) for point in points]
-            more = _inside_formula(scene.joined_chains[name], min(each.formula.iterations, most), own)
+            yield name, _inside_formula(scene.joined_chains[name], min(each.formula.iterations, most), own)
         else:
             assert isinstance(each, Simple)
-            more = [each.holds(point) for point in points]
-        found = [_JOINED[each.join](a, b) for a, b in zip(found, more, strict=True)]
-    return found
+            yield name, [each.holds(point) for point in points]
 
 
 def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -> list[bool]:
@@ -356,6 +391,7 @@ _PARTS = (
     _check_eyes,
     _check_stereo,
     _check_views,
+    _check_light_count,
     _check_lights,
     _check_places,
 )

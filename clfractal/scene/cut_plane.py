@@ -9,7 +9,7 @@ from clfractal.scene.rectangle import Plane
 from clfractal.scene.sampled import Sampled
 from clfractal.schema.base import Color, Coordinate, Fraction, Section, Vector
 from clfractal.schema.fields import WHOLE, Usual
-from clfractal.schema.names import ObjectName
+from clfractal.schema.names import MaterialName, ObjectName
 from clfractal.schema.stops import Palette
 
 Iterations = Annotated[int, Field(strict=True, ge=1, le=1_000_000)]
@@ -72,10 +72,17 @@ class CutPlane(Section):
         description="with `cut`, whether the set is cut, with all that is joined to it; false: only what `objects` names",
     )
     objects: Annotated[tuple[ObjectName, ...], Field(strict=False, max_length=MAX_OBJECTS)] = Field(
-        (), description="with `cut`, what stands beside the set and this plane cuts too: names of `objects`"
+        (),
+        description="with `cut`, what this plane cuts too: names of `objects` beside the set, and with `set: false` of"
+        " parts that are joined to it",
     )
     iterations: Annotated[Iterations, Usual(1, 1000), WHOLE] | None = Field(
         None, description="maximum number of iterations on the plane; null: formula.iterations"
+    )
+    material: MaterialName | None = Field(
+        None,
+        description="with `cut`, along paths: one of `materials` for its faces, in the plane's colours where its"
+        " `base` has none; null: they are matt",
     )
     count: Annotated[int, Usual(1, 32)] = Field(1, ge=1, le=256, description="number of parallel planes")
     spacing: Coordinate = Field(
@@ -89,7 +96,7 @@ class CutPlane(Section):
 
     @property
     def cut_objects(self) -> tuple[str, ...]:
-        """What it removes parts of beside the set, by name."""
+        """What it removes parts of beside the set, or of the set's parts, by name."""
         return self.objects if self.cut else ()
 
     def in_front(self, point: Vector) -> bool:

@@ -9,6 +9,7 @@ from clfractal.files.marks import Document, Node
 from clfractal.files.regular import read_text_file
 from clfractal.scene.formula import MAX_LINKS
 
+_INCLUDE = "include"
 _SOURCES = ("name", "file", "inline", "chain")
 # formula.chain.0.inline: a file may hold a chain whose links are files again. Deeper ones are left for the schema,
 # which refuses them.
@@ -65,6 +66,11 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path, beside: Path
         inner["inline"] = text
         keys = {"inline" if key == given_as else key: place for key, place in node.keys.items()}
         return replace(node, value=inner, keys=keys)
+    if sources == ["inline"] and isinstance(source.value, dict) and _INCLUDE in source.value:
+        from clfractal.formulas.include import with_included
+
+        merged = with_included(source, Where(path=".".join((*path, "inline"))), folder=folder, beside=beside)
+        return replace(node, value={**node.value, "inline": merged})
     if sources == ["chain"] and isinstance(source.value, list) and len(source.value) <= MAX_LINKS:
         links = [
             _without_files(link, (*path, "chain", str(i)), folder, beside)
@@ -78,7 +84,7 @@ def _without_files(node: Node, path: tuple[str, ...], folder: Path, beside: Path
 
 def _read(file: Node, path: tuple[str, ...], folder: Path, beside: Path) -> Node | None:
     """The text of a formula file as a node, files that it names read too."""
-    from clfractal.formulas.catalog import safe_path
+    from clfractal.formulas.own import safe_path
 
     where = Where(path=".".join((*path, "file")))
     found = safe_path(file.value, folder, where)
@@ -95,10 +101,16 @@ def _read_own(name: Node, path: tuple[str, ...], folder: Path, beside: Path) -> 
 
 
 def _text(found: Path, shown: str, where: Where, path: tuple[str, ...], folder: Path, beside: Path) -> Node:
+    from clfractal.formulas.include import with_included
+
     try:
         text = read_text_file(found, name=shown)
     except FileError as error:
         raise FileError(error.inside(shown), where) from error
-    root = read_document(text, shown, error=FormulaError).root
+    read = read_document(text, shown, error=FormulaError)
+    try:
+        root = with_included(read.root, Where(), folder=folder, beside=beside)
+    except ClfractalError as error:
+        raise read.locate(error) from error
     depth = len(path) - (2 if path[0] == "objects" else 0)
     return _without_files(root, (*path, "inline"), folder, beside) if depth < _DEEPEST else root

@@ -19,7 +19,10 @@ from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import members, one_of
 from clfractal.schema.light import LightBase
 
-MAX_LIGHTS = 64
+MAX_LIGHTS = 4096
+"""Most lights of a scene."""
+MAX_ASKED = 64
+"""Most of those that are all asked at each place: with `lighting.mode: direct`."""
 
 # Kinds of lights are what the folder holds.
 if TYPE_CHECKING:

@@ -157,7 +157,11 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
 
 
 def read_text(path: Path) -> str:
-    """The text of a scene file, or of the scene that a picture holds; FileError if it cannot be read or holds none."""
+    """The text of a scene file, of the scene that a picture holds, or of one that was made of another program's settings.
+
+    Raises:
+        FileError: it cannot be read, or holds no scene.
+    """
     kind = kind_of(path)
     if kind is None:
         return read_text_file(path)
@@ -166,6 +170,11 @@ def read_text(path: Path) -> str:
             "is a volume, not a scene: a scene shows it by renderer.file, and `clfractal mesh` makes triangles of it",
             Where(str(path)),
         )
+    if kind == "settings":
+        # Imported only now: scenes of our own need nothing of it.
+        from clfractal.exchange.mandelbulber import import_settings
+
+        return import_settings(path).text(path.name)
     found = read_scene_text(path)
     if found is None:
         raise FileError("holds no scene: it was not written by clfractal", Where(str(path)))

@@ -6,8 +6,8 @@ from math import exp, isfinite, log
 from typing import Any, TypeAlias
 
 from clfractal.errors import FileError, FormulaError, SceneError, Where
-from clfractal.formulas.catalog import safe_path
 from clfractal.formulas.evaluate import as_function
+from clfractal.formulas.own import safe_path
 from clfractal.formulas.parser import parse
 from clfractal.scene.animation import EASES, Animation, Track
 from clfractal.scene.curves import (

@@ -4,8 +4,14 @@ from collections.abc import Callable
 
 from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.errors import SceneError, Where, unknown_name
-from clfractal.scene.blends import is_glass, is_subsurface
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.glass_parts import (
+    MAX_RECORDS,
+    has_glass_parts,
+    lets_through,
+    light_goes_into,
+    records_of_parts,
+)
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.named_files import volumes_of
@@ -22,17 +28,17 @@ from clfractal.schema.shape import Level, Solid
 def check_objects(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for objects that cannot be shown."""
     _check_named(scene)
-    _check_opened(scene)
+    _check_faces(scene)
     if not scene.objects:
         return
     if not isinstance(scene.renderer, SurfaceRenderer):
         _check_filled(scene, scene.renderer)
     _check_joined(scene)
     _check_volumes(scene)
+    _check_glass_parts(scene)
     for name, each in scene.objects.items():
         check_material(scene, each.material, f"objects.{name}.material")
         _check_kind(scene, name, each.material, Where(path=f"objects.{name}.material"))
-        _check_cut(scene, name, each.material)
         if isinstance(each, Solid) and each.join in ("union", "smooth_union"):
             _check_lights(scene, name, each)
 
@@ -44,8 +50,13 @@ def can_show(renderer: str, kind: str) -> bool:
     )
 
 
+MAX_OPENINGS = 32
+"""How often parts of the set may be cut by planes alone: of each the kernels have a record in constant memory."""
+
+
 def _check_named(scene: Scene) -> None:
     """What planes name can be cut, each for itself or with the set."""
+    openings = 0
     for number, plane in enumerate(scene.cut_planes):
         if not plane.set and not isinstance(scene.renderer, SurfaceRenderer):
             raise SceneError(
@@ -63,36 +74,25 @@ def _check_named(scene: Scene) -> None:
                 )
             if isinstance(each, VolumeObject):
                 raise SceneError(f"{name!r} cannot be cut: it is a volume, which no plane opens", where)
-            if not plane.set and name in scene.joined:
+            openings += int(plane.cut and not plane.set and name in scene.joined)
+            if openings > MAX_OPENINGS:
                 raise SceneError(
-                    f"{name!r} is a part of the set, which is cut as a whole; set: true cuts it", where
+                    f"at most {MAX_OPENINGS} cuts of the set's parts, and this is one more", where
                 )
 
 
-def _check_opened(scene: Scene) -> None:
-    """Along paths a set that light goes into has no faces."""
-    used = scene.material.name
-    if not isinstance(scene.renderer, SurfaceRenderer) or not (inside := _inside(scene, used)):
-        return
+def _check_faces(scene: Scene) -> None:
+    """Faces may have materials along paths, which are no bodies by themselves."""
     for number, plane in enumerate(scene.cut_planes):
-        if plane.cuts_set:
+        path = f"cut_planes.{number}.material"
+        if plane.material is None:
+            continue
+        check_material(scene, plane.material, path)
+        if inside := light_goes_into(scene, plane.material):
             raise SceneError(
-                f"cannot open a set of {inside}, {used!r}, along paths",
-                Where(path=f"cut_planes.{number}.cut"),
-            )
-
-
-def _check_cut(scene: Scene, name: str, material: str | None) -> None:
-    """Nor has such an object that stands beside it."""
-    inside = _inside(scene, material or scene.material.name)
-    if not isinstance(scene.renderer, SurfaceRenderer) or not inside:
-        return
-    for number, plane in enumerate(scene.cut_planes):
-        if name in plane.cut_objects:
-            place = plane.objects.index(name)
-            raise SceneError(
-                f"{name!r} is of {inside}, which cannot be cut along paths",
-                Where(path=f"cut_planes.{number}.objects.{place}"),
+                f"{plane.material!r} is {inside}, and a face is that only where what is cut is; name another material,"
+                " or none",
+                Where(path=path),
             )
 
 
@@ -157,22 +157,6 @@ def _check_joined(scene: Scene) -> None:
             raise SceneError("cannot be smooth_union for a plane, which has no end; a flat box can", where)
 
 
-def _lets_through(scene: Scene, material: str | None) -> bool:
-    """Whether a material is glass along paths."""
-    if material is None or not isinstance(scene.lighting, PathLighting):
-        return False
-    return is_glass(scene.materials[material], scene.materials)
-
-
-def _inside(scene: Scene, material: str | None) -> str:
-    """What light goes into along paths: "glass", or what has "subsurface"; "" for all else."""
-    if _lets_through(scene, material):
-        return "glass"
-    paths = isinstance(scene.lighting, PathLighting)
-    subsurface = paths and material is not None and is_subsurface(scene.materials[material], scene.materials)
-    return "subsurface" if subsurface else ""
-
-
 def check_material(scene: Scene, name: str | None, path: str) -> None:
     """Raises SceneError, at a path, for the name of a material that is not there."""
     if name is None or name in scene.materials:
@@ -190,26 +174,56 @@ def _check_kind(scene: Scene, name: str, material: str | None, where: Where) -> 
     each = scene.objects[name]
     if used is None or (isinstance(each, VolumeObject) and each.is_cloud):
         return
-    if isinstance(each, VolumeObject) and (inside := _inside(scene, used)):
+    if isinstance(each, VolumeObject) and (inside := light_goes_into(scene, used)):
         raise SceneError(f"{used!r} is {inside}, which volumes cannot be; name another material", where)
-    own = scene.material.name
-    if name in scene.joined and used != own:
-        if _lets_through(scene, used):
-            raise SceneError(
-                f"{used!r} is glass, which formulas and what is joined can be only with all of the set",
-                where,
-            )
-        if own in scene.materials and _lets_through(scene, own):
-            raise SceneError(f"{used!r} is not the glass of the set, {own!r}, to which it is joined", where)
+    if name in scene.joined:
+        _check_joined_kind(scene, name, used, where)
     if isinstance(scene.lighting, PathLighting) or material is None:
         return
     if scene.materials[used].blend is not None or any(maps_of(scene.materials[used])):
         raise SceneError(f"{used!r} differs from place to place, which needs lighting.mode: path", where)
 
 
+def _check_joined_kind(scene: Scene, name: str, used: str, where: Where) -> None:
+    """Formulas beside the set's may be of glass or not, each for itself; what flows or cuts is of what it is joined to."""
+    own, join = scene.material.name, scene.joined[name].join
+    if join == "union" or used == own:
+        return
+    if lets_through(scene, used):
+        raise SceneError(
+            f"{used!r} is glass, which what is joined by {join} can be only with all of the set", where
+        )
+    if own in scene.materials and lets_through(scene, own):
+        raise SceneError(f"{used!r} is not the glass of the set, {own!r}, to which it is joined", where)
+
+
+def _check_glass_parts(scene: Scene) -> None:
+    """What a set cannot have of which some parts are glass and others not, or another glass."""
+    if not has_glass_parts(scene):
+        return
+    for name, each in scene.joined.items():
+        if each.join == "smooth_union":
+            raise SceneError(
+                "cannot be smooth_union where some formulas are of glass and others not: name one material for all",
+                Where(path=f"objects.{name}.join"),
+            )
+        if each.join != "union" and each.material is not None:
+            raise SceneError(
+                "is that of what is cut where some formulas are of glass and others not; remove it",
+                Where(path=f"objects.{name}.material"),
+            )
+    records = records_of_parts(scene)
+    if records > MAX_RECORDS:
+        raise SceneError(
+            f"where some formulas are of glass and others not they have at most {MAX_RECORDS} joins and cuts, each of"
+            f" these once more for each glass that it cuts; here are {records}",
+            Where(path="objects"),
+        )
+
+
 def _check_lights(scene: Scene, name: str, solid: Solid) -> None:
     """No light in a solid reaches anything, but one that paths find, or that a cut lets out."""
-    inside = _inside(scene, solid.material or scene.material.name)
+    inside = light_goes_into(scene, solid.material or scene.material.name)
     opened = [plane for plane in scene.cut_planes if name in plane.cut_objects]
 
     def holds(point: Vector) -> bool:

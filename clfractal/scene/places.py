@@ -197,13 +197,15 @@ def trap_distances(chain: Chain, points: Floats, iterations: int, trap: Trap) ->
         alive = np.arange(len(points))
         first = trap.away(np.stack(place[:3], axis=1))
         for application in range(iterations):
-            inside = np.sqrt(sum(part * part for part in state)) <= chain.bailout
+            inside = np.sqrt(sum(part * part for part in state[: chain.size])) <= chain.bailout
             alive, state = alive[inside], [part[inside] for part in state]
             if not len(alive):
                 break
             bound = chain.link_at(application).bound
             constant = reference.constant_of(bound, [part[alive] for part in place])
-            moved = reference.apply(bound, state, constant, backend)
+            moved = reference.apply(
+                bound, state, constant, backend, number=application, carried=chain.carried
+            )
             state = [np.array(np.broadcast_to(part, alive.shape), float) for part in moved]
             result[alive] = np.fmin(result[alive], trap.away(np.stack(state[:3], axis=1)))
     return np.where(np.isfinite(result), result, first)

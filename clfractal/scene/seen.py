@@ -198,7 +198,8 @@ def _set_of(scene: Shown) -> Away:
         else:
             assert isinstance(each, Simple)
             more = each.away
-        found = _joined(found, more, each)
+        alone = [plane for plane in scene.cut_planes if name in plane.cut_objects and not plane.set]
+        found = _joined(found, _cut(more, alone), each)
     box = getattr(scene.renderer, "box", None)
     if box is not None:
         found = _within_box(found, np.array(box.center), np.array(box.sides) / 2)

@@ -80,6 +80,11 @@ class LightBase(Element):
         """
         raise NotImplementedError(cls.tag)
 
+    @classmethod
+    def most_of(cls, table: Sequence[float]) -> float:
+        """The most that such a table tells of any direction, as a factor on `given`: not negative."""
+        raise NotImplementedError(cls.tag)
+
     @property
     def used_color(self) -> Vector:
         """Linear Rec. 709: the light's own colour, or that of its temperature."""
@@ -102,6 +107,22 @@ class SingleLight(LightBase):
     """A light with a record of its own; its numbers there beside those of every light are `numbers`."""
 
     numbers: ClassVar[tuple[Number, ...]] = ()
+
+    @property
+    def extent(self) -> Vector:
+        """How far it reaches from its place along x, y and z, scene units."""
+        return (0.0, 0.0, 0.0)
+
+    @property
+    def weakens(self) -> bool:
+        """Whether it weakens with the square of the distance."""
+        return True
+
+    @property
+    def beam(self) -> tuple[Vector, float, float] | None:
+        """Where it shines to: an axis, up to which angle about it as along it, and how much farther, weaker by the cosine;
+        radians. None: all around."""
+        return None
 
     def packed(self) -> dict[str, object]:
         """What its record has that differs from kind to kind, by names of `LIGHT`; the others are 0."""

@@ -66,7 +66,7 @@ class Simple(Joined):
     """A body that an equation tells, a shape; of a formula only its chain knows what is inside.
 
     A shape is a class in a file of `clfractal/elements/shapes`, and the file of the same name in
-    `kernels/elements/shapes`, which says what functions it has.
+    `kernels/elements/shapes`, which says what functions it has; as a light it is asked for by those of `emitters` there.
     """
 
     spans: ClassVar[int] = 1
@@ -93,7 +93,14 @@ class Level(ObjectBase):
 
 
 class Solid(Simple):
-    """A shape with an inside, around its middle; as a light it is asked for (`kernels/elements/emitters`)."""
+    """A shape with an inside, around its middle.
+
+    Attributes:
+        rounded: how many of its axes, from the first on, round off what is across the others: a ball's three, a cylinder's
+            two; of a box none.
+    """
+
+    rounded: ClassVar[int] = 0
 
     rotation: Angles = Field(
         (0.0, 0.0, 0.0), description="about the x axis of space, then y, then z, degrees"
@@ -123,6 +130,12 @@ class Solid(Simple):
     def ball(self) -> Ball:
         """Around it."""
         return self.position, math.hypot(*(length(axis) for axis in self.axes))
+
+    @property
+    def reach(self) -> float:
+        """How far it is from its middle to any place of it at most, scene units."""
+        long = [length(axis) for axis in self.axes]
+        return math.hypot(max(long[: self.rounded], default=0.0), *long[self.rounded :])
 
     def own_place(self, point: Vector) -> Vector:
         """A point in units of `axes` from its middle."""

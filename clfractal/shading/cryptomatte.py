@@ -23,6 +23,7 @@ from clfractal.files.channels import (
 from clfractal.schema.shape import ObjectBase
 
 if TYPE_CHECKING:
+    from clfractal.scene.cut_plane import CutPlane
     from clfractal.scene.model import Scene
 
 Floats = npt.NDArray[np.float32]
@@ -31,7 +32,10 @@ _MASK = 0xFFFFFFFF
 
 @dataclass(frozen=True, slots=True)
 class Things:
-    """What pixels may show: names, and which of them each thing has that the kernel numbers (the set, then objects).
+    """What pixels may show: names, and which of them each thing has that the kernel numbers.
+
+    These are the set, then objects; and behind them, for each plane, also one that does not cut, the same as they are seen
+    on its faces.
 
     Attributes:
         names: in the order of their numbers, from 1.
@@ -49,7 +53,13 @@ class Things:
 def objects_of(scene: Scene) -> Things:
     """The set and the objects, by their names; the set is `set` unless an object is called so."""
     names = (_free("set", scene.objects), *scene.objects)
-    return Things(names, tuple(range(1, len(names) + 1)))
+    own = tuple(range(1, len(names) + 1))
+    return Things(names, own * (1 + len(_planes(scene))))
+
+
+def _planes(scene: Scene) -> list[CutPlane]:
+    """The planes of a scene, those of a stack one by one."""
+    return [plane for plane in scene.cut_planes for _ in range(plane.count)]
 
 
 def materials_of(scene: Scene) -> Things:
@@ -61,7 +71,12 @@ def materials_of(scene: Scene) -> Things:
         return len(names) if name is None else 1 + names.index(name)
 
     bodies: tuple[ObjectBase, ...] = tuple(scene.objects.values())
-    return Things(names, (number(own), *(number(each.material or own) for each in bodies)))
+    numbers = (number(own), *(number(each.material or own) for each in bodies))
+    faces = [
+        numbers if plane.material is None else (number(plane.material),) * len(numbers)
+        for plane in _planes(scene)
+    ]
+    return Things(names, sum(faces, numbers))
 
 
 def told(framebuffer: Floats, channels: Sequence[str], scene: Scene) -> Floats:

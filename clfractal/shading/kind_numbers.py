@@ -28,6 +28,7 @@ FEATURES = {
     "glass_set": 64,
     "subsurface": 128,
     "clouds": 256,
+    "sought": 512,
 }
 
 _FAMILIES: Mapping[str, Mapping[str, int]] = {

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 from collections.abc import Mapping
 
 import numpy as np
@@ -15,6 +16,9 @@ from clfractal.scene.model import Scene
 from clfractal.schema.kinds import members
 from clfractal.schema.light import SingleLight
 from clfractal.schema.record import all_numbers
+from clfractal.shading.air_lights import ball_tree
+from clfractal.shading.emitter_tree import shining_of
+from clfractal.shading.light_tree import lamps_of, single_lights
 
 Floats = npt.NDArray[np.float32]
 LIGHT_KINDS = kinds("elements/lights")
@@ -44,11 +48,6 @@ LIGHT = Struct(
         *(Field(each.name, each.type, each.count, each.meaning) for each in _NUMBERS),
     ],
 )
-
-
-def single_lights(scene: Scene) -> list[SingleLight]:
-    """The lights that have records of their own."""
-    return [light for light in scene.lights if isinstance(light, SingleLight)]
 
 
 def light_rays(scene: Scene) -> int:
@@ -90,17 +89,47 @@ def light_records(scene: Scene, precision: Precision, begin: int = 0) -> Record:
         begin += table.numbers.size
     rows = [
         _light_row(light, -1 if light.reads is None else places[light.tag, light.reads])
-        for light in (*single_lights(scene), DirectionalLight())
+        for light in (*lamps_of(scene).lights, DirectionalLight())
     ]
     return LIGHT.array(precision, rows)
 
 
 def light_tables(scene: Scene) -> Floats:
-    """What the lights have read of files, one after the other."""
+    """What the lights have read of files, one after the other, and the nodes of trees: of lamps, balls, and what shines."""
     tables = [table.numbers for table in scene.light_tables.values()]
-    return np.concatenate(tables) if tables else np.zeros(0, np.float32)
+    return np.concatenate([*tables, *(nodes.reshape(-1) for nodes in _trees(scene))])
+
+
+def _trees(scene: Scene) -> tuple[Floats, Floats, Floats]:
+    return lamps_of(scene).nodes, ball_tree(scene), shining_of(scene).nodes
+
+
+def tree_begins(scene: Scene) -> int:
+    """The number of `light_tables` at which the nodes begin."""
+    return sum(table.numbers.size for table in scene.light_tables.values())
+
+
+def ball_tree_begins(scene: Scene) -> int:
+    """The same of the balls' tree."""
+    return tree_begins(scene) + lamps_of(scene).nodes.size
+
+
+def emitter_tree_begins(scene: Scene) -> int:
+    """The same of the tree of what shines."""
+    return ball_tree_begins(scene) + ball_tree(scene).size
+
+
+def has_tables(scene: Scene) -> bool:
+    """Whether `light_tables` has any numbers."""
+    return bool(scene.light_tables) or any(nodes.size for nodes in _trees(scene))
 
 
 def tables_key(scene: Scene) -> str:
     """A text that differs for different tables."""
-    return " ".join(["lights", *(table.digest for table in scene.light_tables.values())])
+    digests = (table.digest for table in scene.light_tables.values())
+    return " ".join(["lights", *digests, *map(digest_of, _trees(scene))])
+
+
+def digest_of(nodes: Floats) -> str:
+    """A text that differs for different nodes."""
+    return hashlib.sha256(nodes.tobytes()).hexdigest()

@@ -19,7 +19,13 @@ from clfractal.scene.objects import VolumeObject
 from clfractal.schema.base import unit
 from clfractal.schema.mapped import ColorMap, Map, NumberMap, maps_of
 from clfractal.shading.kind_numbers import COLORINGS
-from clfractal.shading.materials import PBR, material_values, parameter_numbers, used_materials
+from clfractal.shading.materials import (
+    PBR,
+    face_materials,
+    material_values,
+    parameter_numbers,
+    used_materials,
+)
 
 MAP = Struct(
     "Map",
@@ -65,7 +71,20 @@ class MappedMaterials:
     @cached_property
     def blends(self) -> Blends:
         """All materials, in the order of their records."""
-        return blends_of(used_materials(self.scene), self.scene.materials)
+        roots = [*used_materials(self.scene), *face_materials(self.scene).values()]
+        return blends_of(roots, self.scene.materials)
+
+    @property
+    def object_numbers(self) -> tuple[int, ...]:
+        """The numbers of the objects' materials, in the order of the scene."""
+        return self.blends.roots[1 : 1 + len(self.scene.objects)]
+
+    @property
+    def face_numbers(self) -> dict[str, int]:
+        """The numbers of the materials of cuts' faces, by name."""
+        return dict(
+            zip(face_materials(self.scene), self.blends.roots[1 + len(self.scene.objects) :], strict=True)
+        )
 
     @cached_property
     def _own(self) -> list[list[tuple[str, Map]]]:
@@ -255,7 +274,7 @@ def has_participating_media(scene: Scene) -> bool:
 def has_costly(scene: Scene) -> bool:
     """Whether any material has a part that a stage of its own evaluates."""
     return isinstance(scene.lighting, PathLighting) and any(
-        is_costly(each, scene.materials) for each in used_materials(scene)
+        is_costly(each, scene.materials) for each in (*used_materials(scene), *face_materials(scene).values())
     )
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.device.structs import Field, Struct
+from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.materials import PARTS, PbrMaterial
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Material
@@ -164,6 +165,14 @@ def used_materials(scene: Scene) -> list[PbrMaterial]:
     own = used_material(scene)
     named = [each.material for each in scene.objects.values()]
     return [own, *(scene.materials[name] if name is not None else own for name in named)]
+
+
+def face_materials(scene: Scene) -> dict[str, PbrMaterial]:
+    """The materials of the faces of cuts along paths, by name."""
+    if not isinstance(scene.lighting, PathLighting):
+        return {}
+    names = [plane.material for plane in scene.cut_planes if plane.cut and plane.material is not None]
+    return {name: scene.materials[name] for name in names}
 
 
 def material_values(material: PbrMaterial) -> dict[str, object]:

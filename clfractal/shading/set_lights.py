@@ -54,9 +54,18 @@ class SetLights:
     count: int
     data: Floats
 
+    @property
+    def balls(self) -> Floats:
+        """Of each ball its BALL_NUMBERS."""
+        return self.data[: self.count * BALL_NUMBERS].reshape(self.count, BALL_NUMBERS)
+
 
 def set_lights_of(scene: Scene) -> SetLights | None:
     """The balls of a scene's lights on the set, or None if it has no such light."""
+    return scene.derived(_set_lights)
+
+
+def _set_lights(scene: Scene) -> SetLights | None:
     lights = [(number, light) for number, light in enumerate(scene.lights) if isinstance(light, SetLight)]
     if not lights:
         return None

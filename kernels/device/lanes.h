@@ -223,7 +223,7 @@ INLINE uint lanes_bits(mask m) {
 typedef __constant const struct Orbit *orbit_record;
 typedef __constant const struct March *march_record;
 typedef __constant const struct Material *material_record;
-typedef __constant const struct Light *light_record;
+typedef __global const struct Light *light_record;
 typedef __constant const struct View *view_record;
 typedef __global const struct Object *object_record;
 typedef __global const struct CutPlane *plane_record;

@@ -59,7 +59,7 @@ INLINE clearance dual_orbit_end(const dual_orbit *o, mask active, const dual_lim
     mask inside = o->lanes.inside;
     const real count = to_reals(o->lanes.count);
     real distance;
-    if (HAS_SHAPE) {
+    if (ENDS_BY_SHAPE) {
         // The last solid's distance in z, over how fast it changes per scene unit.
         const dual solid = dual_solid_distance(o->z, k);
         surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);

@@ -47,9 +47,9 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
                 square = state_square(z);
                 count += pick(applied, R(1.0), R(0.0));
                 alive = applied & less_equal(square, radius_square);
-                if (!HAS_SHAPE && smooth) highest = fmax(highest, square);
+                if (!ENDS_BY_SHAPE && smooth) highest = fmax(highest, square);
             }
-            if (!HAS_SHAPE && periodicity) {
+            if (!ENDS_BY_SHAPE && periodicity) {
                 mask back = alive;
 #define BACK(s) back &= same_bits(z.s, kept.s);
                 STATE_EACH(BACK)
@@ -69,7 +69,7 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
         }
         if (past_limit) break;
         // At the limit: inside, or on the way from the bailout to the distance bailout.
-        if (HAS_SHAPE) inside |= alive & less_equal(solid_distance(z, k), R(0.0));
+        if (ENDS_BY_SHAPE) inside |= alive & less_equal(solid_distance(z, k), R(0.0));
         else inside |= smooth ? alive & in_set(square, orbit) : alive;
         alive &= ~inside;
         limit = most + (orbit->longest - orbit->iterations);
@@ -111,7 +111,12 @@ CALLED escaped solids_escape(const vec *point, mask active, int smooth, int peri
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
         const int own = most == orbit->iterations ? o->iterations : most;
-        const escaped one = one_escape(solid_own(o, *point), active, smooth, periodicity, own, o, k);
+        escaped one = one_escape(solid_own(o, *point), active, smooth, periodicity, own, o, k);
+        if (o->planes > 0) {
+            const mask left = solid_left(o, *point, active);
+            one.inside &= left;
+            one.count = pick(left, one.count, R(0.0));
+        }
         const real count = pick(one.inside, limit, fmin(one.count, limit));
         all.applications += one.applications;
         all.inside = inside_joined(o->join, all.inside, one.inside);
@@ -120,7 +125,7 @@ CALLED escaped solids_escape(const vec *point, mask active, int smooth, int peri
         else all.count = fmax(all.count, count);
     }
     if (orbit->flows) {
-        all.inside |= solids_inside(point, active, most, orbit, k).inside;
+        all.inside |= orbit_inside(*point, active, most, orbit, k);
         all.count = pick(all.inside, limit, all.count);
     }
     return all;

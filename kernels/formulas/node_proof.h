@@ -94,7 +94,7 @@ INLINE real bend_square(state a, state b, state middle) {
 // middle tell, and twice its size around the middle's is within the bailout. Where the dynamics contract, that image shrinks;
 // at the edge of a region of contraction it bends (for analytic maps by r/d, d the distance to the edge: Koebe's theorem).
 INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, orbit_record orbit, constants k) {
-    if (!LOGARITHMIC || HAS_SHAPE) return candidates & ~candidates;
+    if (!LOGARITHMIC || HAS_SHAPE || CARRIES_NUMBERS) return candidates & ~candidates;
     state c[CORNERS + 1], z[CORNERS + 1];
     UNROLLED_ALONE
     for (int i = 0; i < TURNS(CORNERS); ++i) {

@@ -1,6 +1,6 @@
 // Orbits of points under the formula, as one loop over a packet: escape counts and inside tests; and what the end of any orbit says.
 //
-// From the generated text: STATE_SIZE, state, dual_state, FIRST_COUNT (applications that the starting state already counts),
+// From the generated text: STATE_SIZE, STATE_CARRIED (numbers beside z, if there are any), state, dual_state, FIRST_COUNT (applications that the starting state already counts),
 // LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, dual_start, apply,
 // apply_derivative and dual_apply (each also as ..._by), has_usual_values and its answers beside 0 (EACH_USUAL), state_pick,
 // dual_state_pick, state_square, solid_distance.
@@ -10,6 +10,15 @@
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.
 
 #include "formulas/orbit_types.h"
+
+// Whether a shape, or a distance that a formula tells itself, says what is inside; where |z| grows by powers, the bailout does.
+#define ENDS_BY_SHAPE (HAS_SHAPE && !LOGARITHMIC)
+// Whether numbers go on beside z: equal z need not have equal futures then.
+#ifdef STATE_CARRIED
+#define CARRIES_NUMBERS 1
+#else
+#define CARRIES_NUMBERS 0
+#endif
 
 // Distance to the solid from the last |z|, its count and the growth of |z| per scene unit, g = |J^T z / |z||, given relative
 // to |z|: `relative` = |z| / g.
@@ -86,7 +95,7 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_reco
         count = pick(applied, (real)((scalar)(n + 1)), count);
         alive = applied & less_equal(square, (real)(orbit->distance_square));
     }
-    alive = HAS_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & in_set(square, orbit);
+    alive = ENDS_BY_SHAPE ? active & less_equal(solid_distance(z, k), R(0.0)) : alive & in_set(square, orbit);
     return (orbit_end){count, alive};
 }
 

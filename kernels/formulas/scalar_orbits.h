@@ -32,7 +32,7 @@ INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, orbit_reco
     if (HAS_SHAPE) {
         const real solid = solid_distance(o->z, k);
         distance = most(R(0.0), solid / o->growth);
-        inside = active & less_equal(solid, R(0.0));
+        if (ENDS_BY_SHAPE) inside = active & less_equal(solid, R(0.0));
     } else {
         distance = distance_from_growth(o->lanes.square, sqrt(o->lanes.square) / o->growth, count, orbit);
     }

@@ -21,6 +21,7 @@ INLINE vec solid_turned(orbit_record o, vec own) { return vec_normalize(vec_of_a
 typedef struct {
     real far, most, near, apart, scale;
     mask inside;
+    real body;    // of what is inside: the body there that light goes through, or BODY_OPAQUE; the highest of several
     surface_point surface;
 } solid_found;
 
@@ -31,6 +32,15 @@ INLINE real simple_far(orbit_record o, vec own) {
 }
 
 INLINE mask simple_holds(orbit_record o, vec own) { return less_equal(simple_far(o, own), R(0.0)); }
+
+// Which points of one solid are left by the planes that open it alone.
+INLINE mask solid_left(orbit_record o, vec point, mask inside) {
+    for (int i = 0; i < o->planes; ++i) {
+        orbit_record plane = o + o->first_plane + i;
+        inside &= simple_holds(plane, solid_own(plane, point));
+    }
+    return inside;
+}
 
 INLINE void solid_simple(orbit_record o, vec own, solid_found *found) {
     vec n;

@@ -110,7 +110,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
 #endif
 
 INLINE void formula_all_inside(const vec *points, mask *inside, orbit_record orbit, constants k) {
-    if (!HAS_SHAPE) {
+    if (!ENDS_BY_SHAPE) {
         orbits_inside(points, inside, orbit, k);
         return;
     }

@@ -65,8 +65,50 @@ INLINE real nearest_before(orbit_record o, const solid_found *all) {
     all->near = JOIN(all->near, more.near);       \
     all->apart = JOIN(all->apart, more.apart);
 
-// Joins one more solid to those before it. `rounding`: what a place is not known better than.
+// Leaves of solids what is in one more, too. `rounding`: what a place is not known better than.
+INLINE void solid_bounded(orbit_record o, solid_found *all, solid_found more, real rounding) {
+    // A place that a search has put on a wall may lie behind it by rounding: it is on the wall.
+    const real wall = o->kind == SOLID_FORMULA ? R(0.0) : rounding;
+    const mask counts = less(all->apart, more.apart + wall);
+    // The wall of a simple solid is a part of what it cuts: its orbits are that formula's.
+    if (o->kind != SOLID_FORMULA) {
+        // It has a colour of its own, but the counts of both that flow together there.
+        const real wall_of = more.surface.own.solid;
+        more.surface.own = all->surface.own;
+        more.surface.share = all->surface.share;
+        more.surface.other = all->surface.other;
+        more.surface.own.solid = more.surface.other.solid = wall_of;
+    }
+    surface_replace(o, &all->surface, counts, more.surface);
+    all->scale = pick(counts, more.scale, all->scale);
+    FOLDED(fmax)
+    all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
+}
+
+// Of one solid what the planes leave that open it alone. Their faces are walls, with numbers of their own.
+INLINE void solid_opened(orbit_record o, vec point, solid_found *one, real rounding) {
+    for (int i = 0; i < o->planes; ++i) {
+        orbit_record plane = o + o->first_plane + i;
+        solid_found more = {R(0.0)};
+        solid_simple(plane, solid_own(plane, point), &more);
+        more.most = more.near = more.apart = more.far;
+        more.scale = R(1.0);
+        more.surface.own.solid = (real)((scalar)plane->object);
+        solid_bounded(plane, one, more, rounding);
+    }
+}
+
+// Of two solids in one place the one displaces the other whose body has the higher number: the surface belongs to it.
+INLINE mask displaces(mask nearer, solid_found *all, solid_found more) {
+    const mask both = all->inside & more.inside, higher = less(all->body, more.body), lower = less(more.body, all->body);
+    all->body = pick(more.inside & (~all->inside | higher), more.body, all->body);
+    return (nearer | (both & higher)) & ~(both & lower);
+}
+
+// Joins one more solid to those before it.
 INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real rounding) {
+    const int cuts = o->join == JOIN_CUT || o->join == JOIN_INTERSECTION;
+    if (cuts && o->bare) more.surface.own.solid = all->surface.own.solid;
     if (o->join == JOIN_CUT && o->kind == SOLID_FORMULA) {
         solid_hollow(o, all, more);
         return;
@@ -75,26 +117,11 @@ INLINE void solid_join(orbit_record o, solid_found *all, solid_found more, real 
         more.far = more.near = more.apart = -more.far;
         more.surface.gradient = vec_scale(more.surface.gradient, R(-1.0));
     }
-    if (o->join == JOIN_CUT || o->join == JOIN_INTERSECTION) {
-        // A place that a search has put on a wall may lie behind it by rounding: it is on the wall.
-        const real wall = o->kind == SOLID_FORMULA ? R(0.0) : rounding;
-        const mask counts = less(all->apart, more.apart + wall);
-        // The wall of a simple solid is a part of what it cuts: its orbits are that formula's.
-        if (o->kind != SOLID_FORMULA) {
-            // It has a colour of its own, but the counts of both that flow together there.
-            const real wall_of = more.surface.own.solid;
-            more.surface.own = all->surface.own;
-            more.surface.share = all->surface.share;
-            more.surface.other = all->surface.other;
-            more.surface.own.solid = more.surface.other.solid = wall_of;
-        }
-        surface_replace(o, &all->surface, counts, more.surface);
-        all->scale = pick(counts, more.scale, all->scale);
-        FOLDED(fmax)
-        all->inside &= o->kind == SOLID_FORMULA ? more.inside : less(more.far, -wall);
+    if (cuts) {
+        solid_bounded(o, all, more, rounding);
         return;
     }
-    const mask nearer = less(more.apart, nearest_before(o, all));
+    const mask nearer = displaces(less(more.apart, nearest_before(o, all)), all, more);
     if (o->join == JOIN_SMOOTH) {
         // The smooth minimum of Quilez, of distances as they are: between both, a quarter of the width is added at most.
         const real width = (real)(o->smoothness), a = all->far / all->scale, b = more.far / more.scale;

@@ -84,8 +84,10 @@ CALLED clearance solids_distance(const vec *point, mask active, int asks, orbit_
         solid_found one = solid_ask(o, *point, active, asks, &cost, k);
         one.most = one.far;
         one.scale = (real)(o->step_scale);
+        one.body = (real)((scalar)o->body);
         one.surface.own.of = (real)((scalar)i);
         one.surface.own.solid = (real)((scalar)o->object);
+        solid_opened(o, *point, &one, rounding);
         if (i == 0) all = one;
         else solid_join(o, &all, one, rounding);
     }
@@ -145,13 +147,17 @@ INLINE void orbit_steps(march_orbit *a, march_orbit *b, const vec *points, const
 // Which part of a distance rays may go; `own`: of a formula by itself.
 INLINE real step_scale_of(clearance here, scalar own) { return JOINED ? here.scale : (real)(own); }
 
-// Which points belong to the solid of `limit` applications, if that is not the scene's own limit; then each has its own.
-CALLED orbit_end solids_inside(const vec *point, mask active, int limit, orbit_record orbit, constants k) {
+// Which points belong to the solid of `limit` applications, if that is not the scene's own limit; then each has its own. `body`: the body
+// there that light goes through, or BODY_OPAQUE; the highest of several, and in the open 0.
+CALLED orbit_end solids_inside(const vec *point, mask active, int limit, real *body, orbit_record orbit, constants k) {
+    orbit_end all = {R(0.0), active & ~active};
+    *body = R(0.0);
     if (orbit->flows && limit == orbit->iterations) {
         surface_point ignored;
-        return solids_distance(point, active, ASK_STEP, orbit, k, &ignored).end;
+        all = solids_distance(point, active, ASK_STEP, orbit, k, &ignored).end;
+        *body = pick(all.inside, (real)((scalar)orbit->body), R(0.0));
+        return all;
     }
-    orbit_end all = {R(0.0), active & ~active};
     for (int i = 0; i < orbit->solids; ++i) {
         orbit_record o = orbit + i;
         const vec own = solid_own(o, *point);
@@ -169,14 +175,35 @@ CALLED orbit_end solids_inside(const vec *point, mask active, int limit, orbit_r
                 inside = near & end.inside;
             }
         }
+        inside = solid_left(o, *point, inside);
         all.inside = inside_joined(o->join, all.inside, inside);
+        *body = pick(all.inside, fmax(*body, pick(inside, (real)((scalar)o->body), R(0.0))), R(0.0));
     }
     return all;
 }
 
 INLINE orbit_end orbit_solid(vec point, mask active, int limit, orbit_record orbit, constants k) {
     if (!JOINED) return formula_end(point, active, limit, orbit, k);
-    return solids_inside(&point, active, limit, orbit, k);
+    real ignored;
+    return solids_inside(&point, active, limit, &ignored, orbit, k);
+}
+
+// The same at the formulas' own limits, with the body there; one formula by itself is of the body `own`.
+INLINE orbit_end orbit_bodies(vec point, mask active, real own, real *body, orbit_record orbit, constants k) {
+    if (JOINED) return solids_inside(&point, active, orbit->iterations, body, orbit, k);
+    const orbit_end end = formula_end(point, active, orbit->iterations, orbit, k);
+    *body = pick(end.inside, own, R(0.0));
+    return end;
+}
+
+// Where the list begins of what belongs to a body alone, in records; 0 where there is none.
+INLINE int list_of_body(int body, orbit_record orbit) {
+    for (int at = orbit->next_list; JOINED && at > 0;) {
+        if (orbit[at].body == body) return at;
+        const int next = orbit[at].next_list;
+        at = next > 0 ? at + next : 0;
+    }
+    return 0;
 }
 
 INLINE mask orbit_inside(vec point, mask active, int limit, orbit_record orbit, constants k) {

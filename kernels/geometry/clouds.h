@@ -46,9 +46,8 @@ typedef struct {
 } cloud_place;
 
 // Looks for it on a ray before `far`, for lanes `here`.
-CALLED cloud_place clouds_met(const vec *origin, const vec *direction, real far, mask here, const stream *random, world w) {
+CALLED cloud_place clouds_met(const vec *origin, const vec *direction, real far, mask here, stream *numbers, world w) {
     cloud_place found = {here & ~here, far, R(0.0), R(0.0), color_of(R(0.0), R(0.0), R(0.0))};
-    stream numbers = *random;
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (w.objects[i].kind != OBJECT_CLOUD) continue;
         grid_ray r;
@@ -56,7 +55,7 @@ CALLED cloud_place clouds_met(const vec *origin, const vec *direction, real far,
         if (!any_lane(crosses)) continue;
         real number, value, looked = R(0.0);
         color unused = color_of(R(0.0), R(0.0), R(0.0));
-        const mask met = track(r, r.end, crosses, &numbers, w, &number, &value, &unused, &looked);
+        const mask met = track(r, r.end, crosses, numbers, w, &number, &value, &unused, &looked);
         if (!any_lane(met)) continue;
         const color keeps = color_of(fmin(cloud_number(r, value, 1), R(1.0)), fmin(cloud_number(r, value, 2), R(1.0)),
                                      fmin(cloud_number(r, value, 3), R(1.0)));
@@ -70,15 +69,14 @@ CALLED cloud_place clouds_met(const vec *origin, const vec *direction, real far,
 }
 
 // The part of light that comes through all clouds up to `far`, in the mean.
-CALLED real clouds_passed(const vec *origin, const vec *direction, real far, mask here, const stream *random, world w) {
-    stream numbers = *random;
+CALLED real clouds_passed(const vec *origin, const vec *direction, real far, mask here, stream *numbers, world w) {
     real through = R(1.0);
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (w.objects[i].kind != OBJECT_CLOUD) continue;
         grid_ray r;
         real looked = R(0.0);
         const mask crosses = here & less(R(0.0), through) & cloud_entered(i, *origin, *direction, far, w, &r);
-        if (any_lane(crosses)) through = pick(crosses, through * track_through(r, r.end, crosses, &numbers, w, &looked), through);
+        if (any_lane(crosses)) through = pick(crosses, through * track_through(r, r.end, crosses, numbers, w, &looked), through);
     }
     return through;
 }
@@ -88,8 +86,7 @@ CALLED real clouds_passed(const vec *origin, const vec *direction, real far, mas
 
 // The light that clouds send to the beginning of a ray from its way up to `far`, with nothing dimmed: at places as far apart as each
 // other, moved together by a random part of that.
-CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mask here, const stream *random, world w) {
-    stream numbers = *random;
+CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mask here, stream *numbers, world w) {
     color sum = color_of(R(0.0), R(0.0), R(0.0));
     for (int i = 0; i < w.settings->object_count; ++i) {
         if (w.objects[i].kind != OBJECT_CLOUD) continue;
@@ -97,7 +94,7 @@ CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mas
         mask crosses = here & cloud_entered(i, *origin, *direction, far, w, &r);
         if (!any_lane(crosses)) continue;
         const real count = fmin(floor(r.end / SHINING_APART) + R(1.0), (real)(MOST_SHINING)), apart = r.end / count;
-        real number = stream_next(&numbers, crosses) * apart;
+        real number = stream_next(numbers, crosses) * apart;
         for (int k = 0; k < MOST_SHINING; ++k) {
             crosses &= less((real)((scalar)k), count);
             if (!any_lane(crosses)) break;
@@ -110,7 +107,8 @@ CALLED color clouds_shine(const vec *origin, const vec *direction, real far, mas
     return sum;
 }
 
-// The numbers of a path's ray: where it is scattered on it, what comes through to a light, what shines on it.
+// The numbers of a path's ray: where it is scattered on it, what comes through to a light, what shines on it; and all of a walk.
+#define CLOUD_WALKS 0x20000000u
 #define CLOUD_MEETS 0x40000000u
 #define CLOUD_SHADOW_RAY 0x80000000u
 #define CLOUD_SHINES 0xc0000000u
@@ -118,10 +116,15 @@ INLINE stream cloud_stream(stage s, const packet_pixels *at, uint purpose, world
     return stream_of(at, (uint)w.settings->seed, PURPOSE_FLIGHT + NEXT_BOUNCE * (uint)s.bounce + purpose, s.sample);
 }
 
-// Where a path is scattered on its ray before `far`, which then is that place; what shines on the way there is added.
-INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_far, real *far, mask here, world w) {
+// Where a path is scattered on its ray before `far`, which then is that place, but past what it has `passed` already; what shines on the
+// way there is added.
+INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_far, real *far, real passed, mask here, world w) {
     stream numbers = cloud_stream(s, at, CLOUD_MEETS, w);
-    const cloud_place found = clouds_met(&so_far->origin, &so_far->direction, *far, here, &numbers, w);
+    const mask open = here & less(passed, *far);
+    const real before = pick(open, passed, R(0.0));
+    const vec begin = vec_along(so_far->origin, before, so_far->direction);
+    cloud_place found = clouds_met(&begin, &so_far->direction, *far - before, open, &numbers, w);
+    found.t += before;
     *far = pick(found.met, found.t, *far);
     if (!HAS(w, SHINING_CLOUDS)) return found;
     numbers = cloud_stream(s, at, CLOUD_SHINES, w);
@@ -132,7 +135,7 @@ INLINE cloud_place path_meets_clouds(stage s, const packet_pixels *at, path *so_
 
 // What comes through to a light that was sampled, if its ray has a length.
 INLINE real light_passes_clouds(stage s, const packet_pixels *at, ray shadow_ray, mask here, world w) {
-    const stream numbers = cloud_stream(s, at, CLOUD_SHADOW_RAY, w);
+    stream numbers = cloud_stream(s, at, CLOUD_SHADOW_RAY, w);
     return clouds_passed(&shadow_ray.origin, &shadow_ray.direction, shadow_ray.far, here & less(R(0.0), shadow_ray.far), &numbers, w);
 }
 

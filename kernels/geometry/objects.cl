@@ -31,7 +31,7 @@ INLINE mask rays_waiting(queue q, int at, mask *wanted) {
 
 // Finds the first object on each ray that was sent.
 STAGE(meet_objects) {
-    queue q = STAGE_QUEUE;
+    queue q = OBJECTS_QUEUE;
     const world w = WORLD;
     if (WAS_CANCELLED) return;
 #if LANES == 1
@@ -74,7 +74,7 @@ INLINE real face_count(real thing, world w) {
 
 // Looks at the objects that rays have met: their normals, the places where they are shaded, and faces of their cuts.
 STAGE(look_at_objects) {
-    const queue q = STAGE_QUEUE;
+    const queue q = OBJECTS_QUEUE;
     const world w = WORLD;
     const int at = ITEM * LANES;
     if (at >= q.turns * q.wave || WAS_CANCELLED) return;

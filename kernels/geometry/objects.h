@@ -99,6 +99,27 @@ INLINE mask object_holds(object_record o, vec point) {
     return shape_holds(o->kind, vec_splat(o->form), own);
 }
 
+// Whether a place is inside the object with this index, and no plane has removed it there.
+INLINE mask object_left(int i, vec place, object_record objects, plane_set planes) {
+    mask left = object_holds(objects + i, place);
+    for (int plane = 0; plane < planes.count; ++plane) {
+        if (!plane_cuts(planes.planes + plane, i)) continue;
+        const vec from = vec_sub(place, vec_splat(planes.planes[plane].center));
+        left &= less(vec_dot(from, vec_splat(planes.planes[plane].normal)), R(0.0));
+    }
+    return left;
+}
+
+// The normal at a place of a thing that is an object's own surface or the face of a cut of it, away from the inside.
+INLINE vec thing_normal(real thing, object_record o, vec place, plane_set planes, __global const float *tables) {
+    vec normal = object_normal(o, place, tables);
+    const real plane = plane_of_face(thing);
+    for (int i = 0; i < planes.count; ++i) {
+        normal = vec_pick(equal(plane, (real)((scalar)i)), vec_splat(planes.planes[i].normal), normal);
+    }
+    return normal;
+}
+
 // What a ray has met of the objects with these numbers: where that is the face of a cut its number, normal and place.
 INLINE real objects_faced(vec origin, vec direction, real number, object_record objects, plane_set planes, int count,
                           vec *normal, vec point, vec *place) {

@@ -11,9 +11,9 @@ typedef struct {
     int count;
 } plane_set;
 
-// The face of a cut is a thing that is seen, with a number of its own: FACE_OF_PLANE for each plane, the first one once, and the number of
+// The face of a cut is a thing that is seen, with a number of its own: FACES for each plane, the first one once, and the number of
 // the object that is cut there, 0 for the set.
-#define FACE_OF_PLANE R(128.0)
+#define FACE_OF_PLANE ((real)((scalar)FACES))
 #define MOST_OBJECTS 64
 
 INLINE real face_number(real plane, real object) { return (plane + R(1.0)) * FACE_OF_PLANE + object; }
@@ -52,6 +52,21 @@ INLINE mask planes_cut(ray *r, real *face, plane_set set) {
         if (set.planes[i].cut) plane_cut(set.planes + i, i, r->origin, r->direction, &r->near, &r->far, face);
     }
     return less(r->near, r->far);
+}
+
+// How far along a ray from within the part of the set that planes leave it is up to the first of them, and which one that is; the largest
+// number where it meets none.
+INLINE real way_to_cut(vec origin, vec direction, real *plane, plane_set set) {
+    real nearest = (real)(REAL_LARGEST), near = R(0.0), face = R(-1.0);
+    *plane = R(-1.0);
+    for (int i = 0; i < set.count; ++i) {
+        if (!set.planes[i].cut) continue;
+        real far = nearest;
+        plane_cut(set.planes + i, i, origin, direction, &near, &far, &face);
+        *plane = pick(less(far, nearest), (real)((scalar)i), *plane);
+        nearest = fmin(far, nearest);
+    }
+    return nearest;
 }
 
 // Whether a plane cuts the object with this index.

@@ -17,13 +17,14 @@ INLINE escaped plane_look(vec point, mask active, int i, plane_set set) {
     return e;
 }
 
-// Whether the rays that begin at a plane which cuts the set begin inside it: faces, with their colours.
-INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tint, vec *normal, real *count) {
+// Whether the rays that begin at a plane which cuts the set begin inside it: faces, with their colours and the body there.
+INLINE mask planes_face(ray r, real face, mask active, plane_set set, color *tint, vec *normal, real *count, real *body) {
     mask found = active & ~active;
     active &= less(R(-0.5), face);
     if (!any_lane(active)) return found;
     const vec point = vec_along(r.origin, r.near, r.direction);
-    const mask inside = orbit_inside(plane_place(point, set.planes), active, set.orbits->iterations, set.orbits, set.k);
+    const vec place = plane_place(point, set.planes);
+    const mask inside = orbit_bodies(place, active, R(0.0), body, set.orbits, set.k).inside;
     for (int i = 0; i < set.count; ++i) {
         const mask here = inside & active & equal(face, (real)((scalar)i));
         if (!any_lane(here)) continue;

@@ -20,12 +20,12 @@ STAGE(find_faces) {
     const camera_sample a = camera_sample_kept(s);
     path so_far;
     ray r = path_ray(s, eye_ray(&a, view), a.wanted, &so_far);
-    real from;
+    real from, body = R(0.0);
     const mask left = planes_cut(&r, &from, w.planes) & mask_of(so_far.on_path);
     plane_face face = {.t = r.near};
-    mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count);
+    mask bare = planes_face(r, from, left, w.planes, &face.tint, &face.normal, &face.count, &body);
     if (s.q.objects) bare &= less(face.t, lanes_load(s.q.rays + RAY_OBJECT * s.q.stride + s.slot));
-    face.number = pick(bare, face_number(from, R(0.0)), R(0.0));
+    face.number = pick(bare, face_number(from, thing_of_body(body, w)), R(0.0));
     STATE_KEEP(s, face, STATE_FACE);
     __global scalar *far = s.q.rays + RAY_FAR * s.q.stride + s.slot;
     lanes_store(pick(bare, R(-1.0), lanes_load(far)), far);

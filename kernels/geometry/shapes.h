@@ -2,6 +2,7 @@
 // ray stay the same. `form`: numbers of the shape's own. A kind is a file of `elements/shapes` with these functions:
 //   span NAME_span(vec form, int number, vec from, vec way)      a part of a ray's line within; most shapes have one only
 //   vec NAME_normal(vec form, vec own)                           at a place of the surface, away from the inside; of any length
+//   vec NAME_bends(vec form, vec own, vec way)                   how that changes there on a way along the surface
 //   vec NAME_on(vec form, vec own)                               that place without the rounding of the way there
 //   mask NAME_holds(vec form, vec own)                           whether a place is inside
 //   real NAME_far(vec form, vec own, vec sides, vec *n)          how far the surface is in scene units, below 0 inside, and the direction
@@ -9,7 +10,7 @@
 //   enum { NAME_turn = EQUATION }                                and how its span is found: by an EQUATION that is solved at once, of
 //                                                                one part, or by a SEARCH in steps and perhaps of several parts,
 //                                                                whose registers other shapes do not pay for
-// A solid also has a file of `elements/shapes/emitters`, with the functions of `emitter_places.h`.
+// It also has a file of `elements/shapes/emitters`, with the functions of `emitter_places.h`.
 
 #include "geometry/spans.h"
 
@@ -31,6 +32,8 @@ INLINE span shape_span(int kind, int turn, vec form, int number, vec from, vec w
 }
 #define NORMAL_OF(KIND, name) case SHAPE_##KIND: return name##_normal(form, own);
 INLINE vec shape_normal(int kind, vec form, vec own) { switch (kind) { SHAPES(NORMAL_OF) default: return vec_of(R(0.0), R(0.0), R(1.0)); } }
+#define BENDS(KIND, name) case SHAPE_##KIND: return name##_bends(form, own, way);
+INLINE vec shape_bends(int kind, vec form, vec own, vec way) { switch (kind) { SHAPES(BENDS) default: return vec_of(R(0.0), R(0.0), R(0.0)); } }
 #define ON(KIND, name) case SHAPE_##KIND: return name##_on(form, own);
 INLINE vec shape_on(int kind, vec form, vec own) { switch (kind) { SHAPES(ON) default: return own; } }
 #define HOLDS(KIND, name) case SHAPE_##KIND: return name##_holds(form, own);

@@ -50,6 +50,29 @@ INLINE vec water_normal(object_record o, real u, real v) {
     return normal;
 }
 
+// The height over a place of the plane, its slopes along the plane's axes, and how these change along them.
+typedef struct {
+    real height, slope_x, slope_y, bend_x, bend_y, bend_both;
+} water_shape;
+
+INLINE water_shape water_shape_at(object_record o, real u, real v) {
+    water_shape s = {R(0.0), R(0.0), R(0.0), R(0.0), R(0.0), R(0.0)};
+    for (int i = 0; i < WAVES; ++i) {
+        real sine, cosine;
+        wave_turn(wave_phase(o, i, u, v), &sine, &cosine);
+        const real height = (real)(o->wave_height[i]), sharp = (real)(o->wave_sharp), x = (real)(o->wave_x[i]), y = (real)(o->wave_y[i]);
+        const real twice = R(2.0) * cosine * cosine - R(1.0);
+        const real slope = -height * sine * (R(1.0) + R(4.0) * sharp * cosine), bend = -height * (cosine + R(4.0) * sharp * twice);
+        s.height += height * (cosine + sharp * twice);
+        s.slope_x += slope * x;
+        s.slope_y += slope * y;
+        s.bend_x += bend * x * x;
+        s.bend_y += bend * y * y;
+        s.bend_both += bend * x * y;
+    }
+    return s;
+}
+
 // How much the height over a way can change, at most, and how much that change can.
 INLINE void water_limits(object_record o, vec way, real *slope, real *bend) {
     real first = R(0.0), second = R(0.0);

@@ -13,7 +13,7 @@
 // What every stage of a surface's picture is given: one list, so that the host sets it once.
 #define STAGE_ARGUMENTS                                                                                                    \
     PASS_BUFFERS, __constant const struct March *settings, __constant const struct Orbit *orbit,                           \
-        __constant const scalar *k, __constant const struct Material *material, __constant const struct Light *lights,     \
+        __constant const scalar *k, __constant const struct Material *material, __global const struct Light *lights,       \
         __global const float *palette, __global const float *environment, __global const struct CutPlane *planes,          \
         __global const float *plane_palettes, __constant const struct Pbr *materials, __global const float *albedos,            \
         __global const struct Map *maps, __global const float *tables, __global const scalar *set_lights,                       \
@@ -36,8 +36,11 @@
 #define STAGE(name) __kernel void name(STAGE_ARGUMENTS)
 #endif
 #define STAGE_QUEUE {rays, met, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects, settings->point_count > 1}
-// That of a march, which knows nothing of objects beside the set; `known`: whether something may be known of rays.
-#define MARCH_QUEUE(known) {rays, met, wave, turns, queue_stride, settings->met_numbers, 0, known}
+// Those of stages that take whatever rays wait, from turn number `next_turns` on: that of a march, which knows nothing of objects beside the
+// set (`known`: whether something may be known of rays); and that of objects.
+#define MARCH_QUEUE(known) {rays + next_turns * wave, met + next_turns * wave, wave, turns, queue_stride, settings->met_numbers, 0, known}
+#define OBJECTS_QUEUE                                                                                                       \
+    {rays + next_turns * wave, met + next_turns * wave, wave, turns, queue_stride, settings->met_numbers, settings->meets_objects, settings->point_count > 1}
 // The counts of one of the wave's packets, so that those of no packet grow beyond numbers: every work-item's share of rays has another.
 #define PACKET_HERE (ITEM % (wave / LANES))
 #define STATISTICS_HERE                                                                                                    \

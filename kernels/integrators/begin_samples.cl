@@ -30,6 +30,11 @@ STAGE(begin_samples) {
     ray r = eye_ray(&a, view);
     r.footprint *= (real)(w.settings->touch_share);
     r.spread *= (real)(w.settings->touch_share);
+    if (w.settings->eye_body > 0) {
+        queue_skip(s.q, 0, s.slot);
+        send_within_set(s, r, (real)((scalar)w.settings->eye_body), mask_of(a.wanted), w);
+        return;
+    }
     // A pixel's points look for objects on their own rays.
     send_clipped(s, 0, r, begin.t, settings->point_count > 1 ? GOES_PAST : WHICH, mask_of(a.wanted), w);
 }

@@ -32,9 +32,7 @@ STAGE(color_interactions) {
     interaction here = interaction_kept(s, bounce);
     const mask seen = mask_of(here.found), found = seen & of_the_set(here.object, w);
     if (!any_lane(settings->asked_count > 0 ? seen : found)) return;
-    path so_far;
-    const camera_sample a = camera_sample_kept(s);
-    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    const vec direction = ray_to_interaction(s, next_turns, w).direction;
     interaction there = here;
     const real width = HAS(w, BUMP) ? bump_width(&here, w) : R(-1.0);
     const mask rises = less(R(0.0), width);

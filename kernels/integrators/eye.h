@@ -11,12 +11,46 @@ INLINE mask of_the_set(real object, world w) {
     return found;
 }
 
-// The number of an object's material, or the set's.
+// Bodies that light goes through have numbers: objects their own, those of the set the ones after all objects.
+INLINE mask is_set_body(real body, world w) { return less((real)((scalar)w.settings->object_count), body); }
+
+// The body of a thing: of what is opaque, or only cuts the set, below 0.
+INLINE real body_of_thing(real thing, world w) {
+    real found = (real)((scalar)w.settings->set_body);
+    for (int i = 0; i < w.settings->object_count; ++i) found = pick(equal(thing, (real)((scalar)(i + 1))), (real)((scalar)w.objects[i].body), found);
+    return found;
+}
+
+// The other way round: a thing that is of a body of the set, or opaque; the set itself where it is.
+INLINE real thing_of_body(real body, world w) {
+    real found = R(0.0);
+    body = pick(equal(body, (real)((scalar)BODY_OPAQUE)), R(-1.0), body);
+    for (int i = 0; i < w.settings->object_count; ++i) found = pick(equal(body, (real)((scalar)w.objects[i].body)), (real)((scalar)(i + 1)), found);
+    return pick(equal(body, (real)((scalar)w.settings->set_body)), R(0.0), found);
+}
+
+#define THROUGH 1   // of an object's `glass`, where light goes through it: it may go below the boundary, too
+
+// Whether fog begins at the eye: it fills the open, and no body that light goes through.
+INLINE mask fog_at_eye(vec eye, world w) {
+    mask open = equal((real)((scalar)w.settings->eye_body), R(0.0));
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (w.objects[i].glass == THROUGH) open &= ~object_left(i, eye, w.objects, w.planes);
+    }
+    return open;
+}
+
+// The number of an object's material, or the set's; of the face of a cut its plane's, or that of what was cut there.
 INLINE real object_material(real object, world w) {
     real number = (real)((scalar)w.settings->set_material);
+    const real plane = plane_of_face(object), cut = thing_cut(object);
     for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask there = equal(object, (real)((scalar)(i + 1)));
+        const mask there = equal(cut, (real)((scalar)(i + 1)));
         number = pick(there, (real)((scalar)w.objects[i].material), number);
+    }
+    for (int i = 0; i < w.planes.count; ++i) {
+        if (w.planes.planes[i].material < 0) continue;
+        number = pick(equal(plane, (real)((scalar)i)), (real)((scalar)w.planes.planes[i].material), number);
     }
     return number;
 }
@@ -70,6 +104,14 @@ INLINE void send_clipped(stage s, int turn, ray r, real free, real enough, mask 
     send_to_set(s, turn, r, free, wanted, w);
 }
 
+// The ray of a path that is within a body of the set, which marches of another kind take to its end, knows the body.
+INLINE __global scalar *within_body(stage s) { return s.q.rays + RAY_KNOWN * s.q.stride + s.q.wave + s.slot; }
+
+INLINE void send_within_set(stage s, ray r, real body, mask wanted, world w) {
+    send_clipped(s, 1, r, R(0.0), WHICH, wanted, w);
+    lanes_store_at(body, within_body(s), &s.q.lanes);
+}
+
 // The ray that finds the next interaction: the one from the eye, or after a bounce the mirrored one; and the light of the path so far.
 INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     so_far->on_path = wanted;
@@ -84,6 +126,20 @@ INLINE ray path_ray(stage s, ray r, real wanted, path *so_far) {
     return r;
 }
 
+// The ray that has found an interaction: that of the path, or one of the turn `turn`.
+INLINE ray ray_to_interaction(stage s, int turn, world w) {
+    if (turn > 0) return queue_ray(s.q, turn, s.slot);
+    path so_far;
+    const camera_sample a = camera_sample_kept(s);
+    return path_ray(s, eye_ray(&a, w.view), a.wanted, &so_far);
+}
+
+// Where the state begins that says what light awaits that a clear body bends.
+INLINE int bent_awaited(stage s) {
+    bent ways;
+    return s.at[STATE_BENT] + (int)((real *)&ways.awaited - (real *)&ways);
+}
+
 // The lanes whose paths have not ended at an earlier interaction, or for which light that they sampled is awaited: nothing is left to do for
 // others. (What is kept says so from the second bounce on, and rays that are not sent stay so.)
 INLINE mask paths_left(stage s) {
@@ -96,8 +152,16 @@ INLINE mask paths_left(stage s) {
     mask left = less(R(1.0), R(0.0));
     for (int i = 0; i < 5; ++i) left |= ~equal(lanes_load(s.state + numbers[i] * s.stride), R(0.0));
     if (KEEPS(s, STATE_HALT)) left |= ~equal(lanes_load(state_part(s, STATE_HALT)), R(0.0));
+    if (KEEPS(s, STATE_BENT)) {
+        for (int i = 0; i < 3; ++i) left |= ~equal(lanes_load(s.state + (bent_awaited(s) + i) * s.stride), R(0.0));
+    }
     return left;
 }
 INLINE int paths_are_over(stage s) { return !any_lane(paths_left(s)); }
 // The head of a stage along paths: packets end whose paths are over.
 #define PATH_STAGE_BEGINS(name, data) STAGE_BEGINS(name, data); if (paths_are_over(name)) return
+// The same of one that first reads what is kept of them.
+#define KEPT_PATH_STAGE_BEGINS(name, data, path_name, state_name) \
+    PATH_STAGE_BEGINS(name, data);                                \
+    STATE_KEPT(name, path, path_name, STATE_PATH);                \
+    path_state state_name = path_state_kept(name)

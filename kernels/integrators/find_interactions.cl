@@ -16,7 +16,7 @@ STAGE(find_interactions) {
     real object;
     vec place;
     ray_hit seen = surface_met(s, 0, r, &object, &place, w);
-    if (bounce > 0 && HAS(w, GLASS_SET)) seen = met_within(s, r, seen, &object, &place, w);
+    if (HAS(w, GLASS_SET) && (bounce > 0 || w.settings->eye_body > 0)) seen = met_within(s, r, seen, &object, &place, w);
     counters_met(&cost, seen, 1);
     const sighting at_first = {seen.hit, seen.steps};
     interaction found = interaction_of_ray(r, seen, object, place, w);

@@ -26,11 +26,9 @@ STAGE(find_materials) {
     }
 #endif
     if (!any_lane(mask_of(here.found))) return;
-    const camera_sample a = camera_sample_kept(s);
-    path so_far;
-    const vec direction = path_ray(s, eye_ray(&a, view), a.wanted, &so_far).direction;
+    const vec direction = ray_to_interaction(s, next_turns, w).direction;
     mask emerges = less(R(1.0), R(0.0));
-    if (HAS(w, SUBSURFACE)) {
+    if (HAS(w, SUBSURFACE) && next_turns == 0) {
         const path_state with = path_state_kept(s);
         emerges = path_emerges(bounce, &with, &here, w);
     }

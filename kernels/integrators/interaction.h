@@ -67,19 +67,22 @@ INLINE ray_hit surface_met(stage s, int turn, ray r, real *object, vec *place, w
 INLINE real largest_of(vec a) { return fmax(fmax(fabs(a.x), fabs(a.y)), fabs(a.z)); }
 
 // How far over an interaction rays leave it: far enough from the set not to meet the very bump that they start from. An object has none, nor
-// has a face: from those rays leave as near as numbers are sure to be on the right side (Pharr, Jakob, Humphreys 2023, sec. 6.8).
+// has a face: from those rays leave as near as numbers are sure to be on the right side (Pharr, Jakob, Humphreys 2023, sec. 6.8). The face of
+// a joined part is a part of the set, which marches find.
 INLINE real lift_of(const interaction *here, world w) {
     real lift = here->cone * (real)(w.settings->shadow_lift);
     if (w.settings->object_count + w.planes.count == 0) return lift;
-    const real own = largest_of(here->point), each = LIFT_ERRORS * (real)(REAL_EPSILON);
+    const real own = largest_of(here->point), each = LIFT_ERRORS * (real)(REAL_EPSILON), cut = thing_cut(here->object);
+    mask beside = less(R(0.0), R(1.0));
     for (int i = 0; i < w.settings->object_count; ++i) {
         __global const struct Object *o = w.objects + i;
+        if (o->kind == OBJECT_JOINED) beside &= ~equal(cut, (real)((scalar)(i + 1)));
         const mask on = o->kind == OBJECT_JOINED ? less(R(1.0), R(0.0)) : equal(here->object, (real)((scalar)(i + 1)));
         lift = pick(on, (real)(o->lift) * here->cone + each * ((real)(o->error_share) * own + (real)(o->error)), lift);
     }
     const real plane = plane_of_face(here->object);
     for (int i = 0; i < w.planes.count; ++i) {
-        const mask on = equal(plane, (real)((scalar)i));
+        const mask on = beside & equal(plane, (real)((scalar)i));
         lift = pick(on, each * (own + largest_of(vec_splat(w.planes.planes[i].center))), lift);
     }
     return lift;
@@ -124,6 +127,25 @@ INLINE mask interaction_on_face(stage s, ray r, interaction *here, world w) {
     return bare;
 }
 
+// Where a ray within a body of the set comes to a plane that opens it before all else, it has met the face there from behind.
+INLINE void leaves_by_face(ray r, real body, mask within, ray_hit *met, real *object, vec *place, world w) {
+    real plane;
+    const real way = way_to_cut(r.origin, r.direction, &plane, w.planes), radius = (real)(w.settings->bounds_radius);
+    const vec point = vec_along(r.origin, way, r.direction), arm = vec_sub(point, vec_splat(w.settings->bounds_center));
+    const mask there = within & less_equal(R(0.0), plane) & ~(mask_of(met->hit) & less(met->t, way)) & less(vec_dot(arm, arm), radius * radius);
+    if (!any_lane(there)) return;
+    for (int i = 0; i < w.planes.count; ++i) {
+        const mask on = there & equal(plane, (real)((scalar)i));
+        met->normal = vec_pick(on, vec_scale(vec_splat(w.planes.planes[i].normal), R(-1.0)), met->normal);
+        *place = vec_pick(on, place_on_plane(w.planes.planes + i, point), *place);
+    }
+    met->hit = pick(there, R(1.0), met->hit);
+    met->t = pick(there, way, met->t);
+    met->part = pick(there, R(0.0), met->part);
+    met->other = pick(there, R(0.0), met->other);
+    *object = pick(there, face_number(plane, thing_of_body(body, w)), *object);
+}
+
 // What a path has met: its ray within the set is its second one, and was sent in place of the first.
 INLINE ray_hit met_within(stage s, ray r, ray_hit met, real *object, vec *place, world w) {
     const ray second = queue_ray(s.q, 1, s.slot);
@@ -134,6 +156,7 @@ INLINE ray_hit met_within(stage s, ray r, ray_hit met, real *object, vec *place,
     *place = vec_pick(within, other_place, *place);
     for (int i = 0; i < NUMBERS_OF(ray_hit); ++i) ((real *)&met)[i] = pick(within, ((const real *)&other)[i], ((real *)&met)[i]);
     *object = pick(within, other_object, *object);
+    if (w.planes.count > 0) leaves_by_face(second, lanes_load(within_body(s)), within, &met, object, place, w);
     return met;
 }
 

@@ -4,8 +4,8 @@
 #include "shading/participating_media.h"
 #include "geometry/clouds.h"
 
-// Finds the paths that a medium scatters before what they have met, and halts them there. Glass has then scattered them, and the stage of
-// interactions leaves them alone; in clouds it does with them as at interactions. Last rays that are scattered are nobody's.
+// Finds the paths that a medium scatters before what they have met, and halts them there. Glass has then scattered them, and in clouds
+// `walk_clouds` does: the stage of interactions leaves both alone. Last rays that are scattered are nobody's.
 STAGE(cross_media) {
     PATH_STAGE_BEGINS(s, w);
     const int is_last = bounce > w.settings->bounces;
@@ -30,26 +30,31 @@ STAGE(cross_media) {
     if (is_last) {
         const ray_hit last = queue_met(s.q, 0, s.slot);
         far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
-        if (HAS(w, GLASS_SET)) on_path &= ~equal(body_of(with.medium), set_body(w));
+        on_path &= ~is_within_set(&with, w);
     }
     light_hit_of(arrived.origin, arrived.direction, bounce == 0, &far, w);
+    halt before = {R(0.0), R(0.0), R(-1.0), R(0.0), R(0.0)};
+    if (bounce > 0) STATE_RECALL(s, before, STATE_HALT);
+    const mask past_last = less((real)((scalar)(w.settings->bounces - bounce)), before.turns);
     cloud_place cloud;
     cloud.met = on_path & ~on_path;
-    if (HAS(w, CLOUDS)) cloud = path_meets_clouds(s, &here.at, &so_far, &far, on_path, w);
+    if (HAS(w, CLOUDS)) cloud = path_meets_clouds(s, &here.at, &so_far, &far, before.passed, on_path, w);
     mask scatters = on_path & ~on_path;
     if (KEEPS(s, STATE_FLIGHT)) scatters = flight_ends(&so_far, &with, way_within(&with, far, w), on_path);
     cloud.met &= ~scatters;
-    const mask halted = scatters | cloud.met;
+    const mask over = (scatters | cloud.met) & past_last;
+    so_far.on_path = pick(over, R(0.0), so_far.on_path);
     if (is_last) {
-        so_far.on_path = pick(halted, R(0.0), so_far.on_path);
         STATE_KEEP(s, so_far, STATE_PATH);
         return;
     }
+    scatters &= ~over;
     interaction_of_light(s, &found, arrived.origin, arrived.direction, with.flight, with.medium, scatters);
-    halt stop = {pick(scatters, HALTED_BY_GLASS, R(0.0)), R(0.0), R(-1.0)};
+    halt stop = {pick(scatters, HALTED_BY_GLASS, R(0.0)), R(0.0), R(-1.0), R(0.0), before.turns};
     if (KEEPS(s, STATE_FLIGHT)) path_was_scattered(s, &here.at, &so_far, &with, scatters, w);
     if (HAS(w, CLOUDS)) {
         interaction_of_light(s, &found, arrived.origin, arrived.direction, cloud.t, cloud.number, cloud.met);
+        cloud.met &= ~over;
         if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, cloud.met, w);
         path_in_cloud(&so_far, &cloud, cloud.met);
         stop.halted = pick(cloud.met, HALTED_BY_CLOUD, stop.halted);
@@ -58,17 +63,4 @@ STAGE(cross_media) {
     STATE_KEEP(s, so_far, STATE_PATH);
     path_state_keep(s, &with);
     STATE_KEEP(s, stop, STATE_HALT);
-}
-
-// What comes through clouds of the light that was sampled.
-STAGE(pass_clouds) {
-    PATH_STAGE_BEGINS(s, w);
-    const place_in_pass here = place_of_packet(s.span, s.packet, s.tile);
-    path_state with = path_state_kept(s);
-    STATE_KEPT(s, halt, stop, STATE_HALT);
-    ray shadow_ray = queue_ray(s.q, 0, s.slot);
-    shadow_ray.far = stop.far;
-    with.awaited = color_scale(with.awaited, light_passes_clouds(s, &here.at, shadow_ray, less(R(0.0), stop.far), w));
-    if (bounce > 0) with.awaited = limited(with.awaited, w.settings);
-    path_state_keep(s, &with);
 }

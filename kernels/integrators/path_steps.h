@@ -32,8 +32,8 @@ INLINE void path_sets_out(stage s, const packet_pixels *at, const path *so_far, 
     flight_begins(with, so_far->through, u, choice, here);
 }
 
-// One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way.
-INLINE light_ray path_samples_light(stage s, const packet_pixels *at, const event *e, real total, world w, color *brings) {
+// One of all lights: a ray towards it, and what the ray brings to the eye if nothing is in its way; where it has to be `sought`, for a light of 1.
+INLINE light_ray path_samples_light(stage s, const packet_pixels *at, const event *e, real total, world w, color *brings, real *seeks) {
     real numbers[LIGHT_SAMPLE_NUMBERS];
     path_light_numbers(s, at, w, numbers);
     const sampled_light a = sample_one_light(e->point, e->from, e->normal, e->own, numbers, total, w);
@@ -42,13 +42,31 @@ INLINE light_ray path_samples_light(stage s, const packet_pixels *at, const even
     color scattered;
     event_value(e, chosen.toward, w, &scattered, &density);
     *brings = sampled_light_brings(&a, scattered, density);
-    mask dark = ~less(R(0.0), brightest(*brings)) | e->shut;
+    mask dark = ~less(R(0.0), brightest(*brings));
     // A body of glass hides what is behind its surface.
-    if (HAS(w, GLASS)) dark |= ~e->in_medium & ~leads_out(chosen.toward, e->surface.surface, e->behind);
+    if (HAS(w, GLASS)) dark |= ~leads_out(chosen.toward, e->surface.surface, e->behind);
     *brings = color_pick(dark, color_of(R(0.0), R(0.0), R(0.0)), *brings);
+    *seeks = pick(dark, R(0.0), a.sought);
     // What nothing can block needs no march.
     chosen.distance = pick(~a.unblocked & ~dark, chosen.distance, R(-1.0));
     return chosen;
+}
+
+// Where the light that was sampled `is` sought, its ray finds what it brings.
+INLINE void light_is_sought(path_state *with, sought *seeks, mask is) {
+    seeks->thing = pick(is, seeks->thing, R(0.0));
+    is = less(R(0.0), seeks->thing);
+    seeks->brings = with->awaited;
+    with->awaited = color_pick(is, color_of(R(0.0), R(0.0), R(0.0)), with->awaited);
+}
+
+// Sends the ray for it, which finds what the path would find that way: from where shadow rays leave, in their direction.
+INLINE void sends_sought(stage s, int turn, const sought *seeks, ray r, const path *so_far, world w) {
+    STATE_KEEP(s, *seeks, STATE_SOUGHT);
+    r.far = (real)(REAL_LARGEST);
+    r.footprint = so_far->footprint;
+    r.spread = so_far->spread;
+    send_clipped(s, turn, r, R(0.0), WHICH, less(R(0.0), seeks->thing), w);
 }
 
 // Goes on in a direction that the event chooses, unless roulette ends the path. The result says which paths go below a boundary.
@@ -60,9 +78,9 @@ INLINE mask path_goes_on(stage s, const packet_pixels *at, path *so_far, path_st
     const onward found = event_sample(e, u, v, choice, wall, w);
     const mask here = mask_of(so_far->on_path), on_path = here & found.goes;
     so_far->direction = vec_pick(here, found.direction, so_far->direction);
-    with->density = pick(here, pick(e->shut, R(-1.0), found.density), with->density);
+    with->density = pick(here, found.density, with->density);
     so_far->through = color_pick(on_path, color_mul(so_far->through, found.part), so_far->through);
-    so_far->on_path = number_of(path_stays(&so_far->through, roulette, s.bounce, w.settings->roulette, on_path));
+    so_far->on_path = number_of(path_stays(&so_far->through, roulette, (real)((scalar)s.bounce), w.settings->roulette, on_path));
     return here & found.sinks;
 }
 
@@ -108,6 +126,7 @@ INLINE mask path_comes_out(int bounce, path_state *with, interaction *here, vec 
     if (HAS(w, SUBSURFACE)) {
         emerges = lands & path_emerges(bounce, with, here, w);
         media_leave(with, body_of(with->medium), emerges);
+        media_enter(with, body_beyond(here, w), emerges & of_the_set(here->object, w));
         if (any_lane(emerges)) media_found(with, medium_of(with->medium, w), emerges);
     }
     here->normal = vec_pick(emerges, here->normal, facing(here->normal, direction));
@@ -153,7 +172,7 @@ INLINE path_state path_state_from_eye(vec eye, world w) {
 // What a path carries when it arrives. With media that scatter light it has been through `cross_media`, which may have halted it.
 INLINE halt path_carries(stage s, path *so_far, path_state *with, vec eye, world w) {
     const int crossed = KEEPS(s, STATE_HALT);
-    halt stop = {R(0.0), R(0.0), R(-1.0)};
+    halt stop = {R(0.0), R(0.0), R(-1.0), R(0.0), R(0.0)};
     *with = s.bounce > 0 || crossed ? path_state_kept(s) : path_state_from_eye(eye, w);
     if (!crossed) return stop;
     if (s.bounce == 0) STATE_RECALL(s, *so_far, STATE_PATH);

@@ -32,6 +32,18 @@ INLINE void aovs_once(stage s, color seen) {
     STATE_KEEP(s, outputs, STATE_AOVS);
 }
 
+// The number of what is seen, from 1: a thing's, with faces of planes that have a material of their own behind all things, plane by plane
+// (`clfractal/shading/cryptomatte.py`).
+INLINE real shown_thing(real object, world w) {
+    real number = thing_cut(object) + R(1.0);
+    const real plane = plane_of_face(object), things = (real)((scalar)(w.settings->object_count + 1));
+    for (int i = 0; i < w.planes.count; ++i) {
+        const mask on = equal(plane, (real)((scalar)i));
+        if (w.planes.planes[i].material >= 0) number = pick(on, number + (real)((scalar)(i + 1)) * things, number);
+    }
+    return number;
+}
+
 // The sample at its end: what its path has seen, over the background; and what it has found first.
 INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen, const interaction *here, world w) {
     STATE_KEPT(s, sighting, first, STATE_SIGHTING);
@@ -40,7 +52,7 @@ INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen
     const color in_all = seen;
     const color on_the_way = color_pick(mask_of(found.found), color_of(R(0.0), R(0.0), R(0.0)), seen);
     pixel_sample result = {seen, mask_of(found.found), first.coverage, R(0.0), found.normal, found.seen, found.smooth, first.steps};
-    result.thing = pick(result.hit, thing_cut(found.object) + R(1.0), R(0.0));
+    result.thing = pick(result.hit, shown_thing(found.object, w), R(0.0));
     result.covers = result.coverage;
     result.depth = depth_of(result.point, a.time, w.view);
     real comes = pick(result.hit, result.coverage, R(0.0));
@@ -48,11 +60,13 @@ INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen
     if (HAS(w, FOG)) {
         const real way = vec_dot(vec_sub(result.point, from_eye.origin), from_eye.direction);
         const color mist = color_splat(w.material->fog_color);
-        const real passes = exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material));
+        const mask fogged = fog_at_eye(from_eye.origin, w);
+        const real passes = pick(fogged, exp(-fog_depth(from_eye.origin, from_eye.direction, way, w.material)), R(1.0));
         seen = color_mix(seen, mist, R(1.0) - passes);
         comes *= pick(result.hit, passes, R(1.0));
         if (w.material->fog_background) {
-            background = color_mix(mist, background, fog_passes_all(from_eye.origin, from_eye.direction, w.material));
+            const real passes_all = pick(fogged, fog_passes_all(from_eye.origin, from_eye.direction, w.material), R(1.0));
+            background = color_mix(mist, background, passes_all);
         }
     }
     color air = color_of(R(0.0), R(0.0), R(0.0)), glow = air;

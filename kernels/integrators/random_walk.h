@@ -48,6 +48,8 @@ INLINE void walk_flies(march *m, walk *a, mask here, world w) {
     a->number = pick(here, number, a->number);
     stop = fmin(stop, met);
     light_hit_of(m->r.origin, m->r.direction, 0, &stop, w);
+    real face;
+    stop = fmin(stop, way_to_cut(m->r.origin, m->r.direction, &face, w.planes));
     a->stop = pick(here, stop, a->stop);
     m->r.far = pick(here, (real)(REAL_LARGEST), m->r.far);
 }
@@ -95,10 +97,10 @@ INLINE void walk_enters(march *m, walk *a, mask here, world w) {
 INLINE void walk_step(march *m, walk *a, int bounce, world w, orbit_record orbit, constants k) {
     march_record settings = w.settings;
     const real step = (real)(settings->step), cone = (real)(settings->detail) * (m->r.footprint + m->r.spread * m->t);
-    MARCH_TESTS(m, point, here);
+    MARCH_TESTS_BODY(m, point, here, body, in_body);
     // The set ends where its bounds do.
     const vec middle = vec_sub(point, vec_splat(settings->bounds_center));
-    const mask within = here.inside & less_equal(vec_dot(middle, middle), (real)(settings->bounds_radius * settings->bounds_radius));
+    const mask within = in_body & less_equal(vec_dot(middle, middle), (real)(settings->bounds_radius * settings->bounds_radius));
     const mask inside = m->active & within, outside = m->active & ~within;
     const real size = fmax(fmax(fabs(point.x), fabs(point.y)), fmax(fabs(point.z), m->t));
     const real least_width = R(2.0) * (real)(REAL_EPSILON) * size, finest = fmax(EXIT_TOLERANCE * cone, least_width);
@@ -118,15 +120,17 @@ INLINE void walk_step(march *m, walk *a, int bounce, world w, orbit_record orbit
     // Within: towards the exit, or to the end of the flight.
     const mask searching = m->active & m->entered & ~m->narrow;
     const mask stops = searching & inside & ~m->left & less_equal(a->stop, m->t);
-    march_narrows(m, inside, outside, searching, finest, (real)(settings->near) * cone);
-    const mask done = sheet | placed, scatters = stops & less_equal(a->with.flight, a->stop);
+    march_narrows(m, inside, outside, searching, body, finest, (real)(settings->near) * cone);
+    mask met;
+    const real free = march_to_walls(m, point, searching & inside & ~m->left & ~stops, cone, &met, settings, orbit, k);
+    const mask done = sheet | placed | met | march_at_walls(m), scatters = stops & less_equal(a->with.flight, a->stop);
     m->found.hit |= done;
     m->active &= ~done & ~(stops & ~scatters);
 
     const real entrance = fmax(ENTRANCE_START * cone, ENTRANCE_GROWTH * (m->t - m->r.near));
     const real back = m->high - fmax(ENTRANCE_START * cone, m->r.near - m->high);
     const real toward_set = pick(found, pick(a->open, R(0.5) * (m->low + m->high), back), m->t + fmin(entrance, step));
-    m->t = pick(before, toward_set, march_goes_to(m, fmin(m->t + step, a->stop)));
+    m->t = pick(before, toward_set, march_goes_to(m, fmin(m->t + fmin(step, free), a->stop)));
     walk_enters(m, a, starts, w);
     walk_scatters(m, a, scatters, bounce, w);
     m->t = pick(starts | scatters, fmin(step, a->stop), m->t);

@@ -11,8 +11,9 @@ INLINE mask wins_roulette(color *through, real stays, real chance, mask here) {
 }
 
 // Ends paths that bring nothing, and from the bounce `first` on others by what they bring: those in clear glass go on.
-INLINE mask path_stays(color *through, real chance, int bounce, int first, mask here) {
+INLINE mask path_stays(color *through, real chance, real bounce, int first, mask here) {
     here &= less(R(0.0), brightest(*through));
-    const real cap = bounce < LONG_PATH ? R(1.0) : LONG_STAYS;
-    return bounce < first ? here : wins_roulette(through, fmin(STAYS_FOR * brightest(*through), cap), chance, here);
+    const real cap = pick(less(bounce, (real)((scalar)LONG_PATH)), R(1.0), LONG_STAYS);
+    const mask asked = here & less_equal((real)((scalar)first), bounce);
+    return (here & ~asked) | wins_roulette(through, fmin(STAYS_FOR * brightest(*through), cap), chance, asked);
 }

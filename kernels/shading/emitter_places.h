@@ -1,4 +1,4 @@
-// Places of objects that shine, chosen by paths that sample them. Nobody samples an object from inside it. A solid has in its file of
+// Places of objects that shine, chosen by paths that sample them. Nobody samples an object from inside it. A shape has in its file of
 // `elements/shapes/emitters`, for "turned" points outside of it:
 //   emitter_place NAME_place(vec form, vec sides, vec point, real choice, real u, real v, const vec *met)
 //                                                                chooses a place that the point sees, or tells the density of what is `met`

@@ -9,7 +9,8 @@ INLINE void sample_lights_beside(choosing *c, const real *numbers, world w);
 // object lights itself.
 INLINE real weight_of_all(vec point, real own, world w) {
     real sum = (real)(w.settings->environment_weight);
-    for (int i = 0; i < w.settings->light_count; ++i) sum += light_weight(w.lights + i, &point, w.tables);
+    for (int i = 0; i < w.settings->single_lights; ++i) sum += light_weight(w.lights + i, &point, w.tables);
+    if (w.settings->tree_nodes > 0) sum += tree_total(&point, LIGHT_TREE(w));
     sum = with_lights_beside(sum, point, own, w);
     return fmax(sum, (real)(REAL_SMALLEST));
 }
@@ -22,7 +23,7 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
         const real of_choice = (real)(w.settings->environment_weight) / total * environment_density(direction, w.material, w.environment);
         sum = color_scale(sum, pick(less(density, R(0.0)), R(1.0), power_share(density, of_choice)));
     }
-    for (int i = 0; i < w.settings->light_count; ++i) {
+    for (int i = 0; i < w.settings->single_lights; ++i) {
         const mask met = light_met(w.lights + i, direction);
         if (!any_lane(met)) continue;
         const real of_light = light_weight(w.lights + i, &from, w.tables) / total * light_density(w.lights + i, from, direction);
@@ -32,35 +33,82 @@ INLINE color light_past(vec direction, real picture_y, vec from, real density, r
     return sum;
 }
 
+// One of the lights with records is chosen: its number and its weight.
+INLINE void light_chosen(choosing *c, mask here, real number, real weight) {
+    c->number = pick(here, number, c->number);
+    c->weight = pick(here, weight, c->weight);
+}
+
+// One of the tree's lamps, where none is chosen before: by the normal, which those that are met by chance do not know any more.
+INLINE void choose_in_tree(choosing *c, world w) {
+    const real weight = tree_total(&c->from, LIGHT_TREE(w)), begins = c->before;
+    const mask here = is_chosen(c, weight);
+    if (!any_lane(here)) return;
+    const real place = bounded((c->place - begins) / pick(here, weight, R(1.0)), R(0.0), R(1.0) - (real)(REAL_EPSILON));
+    const tree_choice found = tree_descent(&c->from, &c->normal, 0, place, here, LIGHT_TREE(w));
+    light_chosen(c, here, found.lamp, weight * found.share);
+    c->found.reckoned = pick(here, found.even / found.share, c->found.reckoned);
+}
+
+// Lanes that have chosen the same light with a record ask it together: the number of the next one, or -1, and which lanes of those `left` these are.
+INLINE int next_chosen(real number, mask *left, mask *here) {
+    *left &= less_equal(R(0.0), number);
+    if (!any_lane(*left)) return -1;
+    scalar each[LANES];
+    lanes_store(number, each);
+    const int i = (int)each[highest_bit(lanes_bits(*left))];
+    *here = *left & equal(number, (real)((scalar)i));
+    *left &= ~*here;
+    return i;
+}
+
+// A place of the light that was chosen.
+INLINE void sample_chosen(choosing *c, real u, real v, world w) {
+    mask left = less(R(0.0), R(1.0)), here;
+    for (int i; (i = next_chosen(c->number, &left, &here)) >= 0;) {
+        light_record light = w.lights + i;
+        takes(c, here, light_sample(light, light->seen ? c->from : c->point, u, v, w.tables), c->weight);
+        if (light_is_met(light) || light->seen) c->found.both |= here;
+        if (!light->shadow) c->found.unblocked |= here;
+    }
+}
+
+// The environment, where none is chosen before.
+INLINE void choose_environment(choosing *c, real u, real v, world w) {
+    const real weight = (real)(w.settings->environment_weight);
+    const mask here = is_chosen(c, weight);
+    if (!any_lane(here) || !has_environment(w.material)) return;
+    light_ray r;
+    r.toward = environment_sample(u, v, w.material, w.environment, &r.density);
+    r.light = environment_color(r.toward, w.material, w.environment);
+    r.distance = (real)(REAL_LARGEST);
+    takes(c, here, r, weight);
+    c->number = pick(here, LIGHT_OF_ENVIRONMENT, c->number);
+    c->found.both |= here;
+}
+
 // One of all lights, chosen by what it can bring to `from`; small ones are seen from `point`. `normal` is zero within a medium, and
 // `own` as above.
-INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
+INLINE choosing choose_light(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
     const real u = numbers[0], v = numbers[1], choice = numbers[2];
     const mask all = less(R(0.0), R(1.0));
     const light_ray none = {vec_of(R(0.0), R(0.0), R(1.0)), R(-1.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
-    choosing c = {point, from, normal, own, total, choice * total, R(0.0), all, {none, R(1.0), R(1.0), ~all, ~all}, from};
-    for (int i = 0; i <= w.settings->light_count; ++i) {
-        const int is_light = i < w.settings->light_count;
-        __constant const struct Light *light = w.lights + (is_light ? i : 0);
-        const real weight = is_light ? light_weight(light, &from, w.tables) : (real)(w.settings->environment_weight);
-        const mask here = is_chosen(&c, weight);
-        if (!any_lane(here)) continue;
-        light_ray r;
-        if (is_light) {
-            r = light_sample(light, light->seen ? from : point, u, v, w.tables);
-        } else {
-            if (!has_environment(w.material)) continue;
-            r.toward = environment_sample(u, v, w.material, w.environment, &r.density);
-            r.light = environment_color(r.toward, w.material, w.environment);
-            r.distance = (real)(REAL_LARGEST);
-        }
-        takes(&c, here, r, weight);
-        if (!is_light || light_is_met(light) || light->seen) c.found.both |= here;
-        if (is_light && !light->shadow) c.found.unblocked |= here;
+    choosing c = {point, from, normal, own, total, choice * total, R(0.0), all, R(-1.0), R(0.0), {none, R(1.0), R(1.0), ~all, ~all, R(0.0)}, from};
+    for (int i = 0; i < w.settings->single_lights; ++i) {
+        const real weight = light_weight(w.lights + i, &from, w.tables);
+        light_chosen(&c, is_chosen(&c, weight), (real)((scalar)i), weight);
     }
+    if (w.settings->tree_nodes > 0) choose_in_tree(&c, w);
+    sample_chosen(&c, u, v, w);
+    choose_environment(&c, u, v, w);
     sample_lights_beside(&c, numbers, w);
-    // Lights hide what is behind them.
-    real far = c.found.ray.distance * R(0.999);
+    return c;
+}
+
+// The same as far as no other light is before it: lights hide what is behind them. (What is sought is found before that is known.)
+INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
+    choosing c = choose_light(point, from, normal, own, numbers, total, w);
+    real far = pick(less(R(0.0), c.found.sought), R(0.0), c.found.ray.distance * R(0.999));
     const light_hit hides = light_hit_of(c.begin, c.found.ray.toward, 0, &far, w);
     c.found.ray.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), c.found.ray.light);
     return c.found;

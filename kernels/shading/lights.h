@@ -10,7 +10,7 @@ typedef struct {
     real density;
 } light_ray;
 
-INLINE light_ray light_sample(__constant const struct Light *light, vec point, real u, real v, __global const float *tables) {
+INLINE light_ray light_sample(light_record light, vec point, real u, real v, __global const float *tables) {
     const incidence in = light_at(light, point, tables);
     light_ray r;
     r.distance = in.distance;
@@ -36,10 +36,10 @@ INLINE light_ray light_sample(__constant const struct Light *light, vec point, r
 }
 
 // Whether rays can meet it by chance: discs at infinity. A point light is as large as it should look from each place, and nowhere.
-INLINE int light_is_met(__constant const struct Light *light) { return light->far && light->spread > S(0.0); }
+INLINE int light_is_met(light_record light) { return light->far && light->spread > S(0.0); }
 
 // Whether a ray that meets nothing else goes into it.
-INLINE mask light_met(__constant const struct Light *light, vec direction) {
+INLINE mask light_met(light_record light, vec direction) {
     if (!light_is_met(light)) return less(R(1.0), R(0.0));
     // 1 - cos, which keeps its digits: half the square of the distance between the directions.
     const vec apart = vec_sub(direction, vec_scale(vec_splat(light->vector), R(-1.0)));
@@ -47,7 +47,7 @@ INLINE mask light_met(__constant const struct Light *light, vec direction) {
 }
 
 // The radiance that a disc at infinity shows.
-INLINE color light_shown(__constant const struct Light *light) {
+INLINE color light_shown(light_record light) {
     const scalar square = light->spread * (S(2.0) - light->spread);
     return color_scale(color_splat(light->color), (real)(light->intensity / square));
 }
@@ -64,7 +64,13 @@ typedef struct {
     real share;            // of all lights, that this one is chosen
     real reckoned;         // a factor on the density with which both ways to find it reckon
     mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
+    real sought;           // of one whose light has to be looked up: 1 + the number of that thing; its own `light` is 1, and `far` unknown
 } sampled_light;
+
+// What is chosen of lights that have no records: the numbers of such choices.
+#define LIGHT_OF_OBJECT(i) (real)((scalar)(-2 - (i)))
+#define LIGHT_OF_ENVIRONMENT R(-1000.0)
+#define LIGHT_OF_SET R(-2000.0)
 
 // Numbers in (0, 1): two for the place on a light, one for the light, two for the one of those on the set.
 #define LIGHT_SAMPLE_NUMBERS 5
@@ -75,6 +81,7 @@ typedef struct {
     real own;                   // the object whose surface it is, or 0: no object lights itself
     real total, place, before;  // all weights; where the choice lies; the weights so far
     mask open;                  // whether none is chosen so far
+    real number, weight;        // of a light with a record: which one, or -1
     sampled_light found;
     vec begin;                  // where the ray to it begins
 } choosing;

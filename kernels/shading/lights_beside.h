@@ -20,6 +20,7 @@ CALLED void sample_set_light(choosing *c, const real *numbers, world w) {
     r.light = color_pick(shines, ball.light, color_of(R(0.0), R(0.0), R(0.0)));
     r.density = density / pick(shines, choice.weight, R(1.0));
     takes(c, here, r, weight);
+    c->number = pick(here, LIGHT_OF_SET, c->number);
     c->found.reckoned = pick(here & shines, choice.weight, c->found.reckoned);
     c->found.both |= here;
     c->found.unblocked |= here & ~ball.shadow;

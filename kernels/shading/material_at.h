@@ -89,9 +89,18 @@ CALLED pbr pbr_at(stage s, const interaction *here, world w) {
     return sum;
 }
 
-// The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut.
-INLINE void pbr_of_face(const interaction *here, pbr *p) {
-    const mask face = on_face(here);
+// The face of a cut is a matt body in the plane's colours (Lambert's), whatever has been cut; but for planes that have a material, and for
+// what light goes into, of which it is a boundary like any other.
+INLINE void pbr_of_face(const interaction *here, pbr *p, world w) {
+    mask face = on_face(here);
+    const real plane = plane_of_face(here->object), cut = thing_cut(here->object);
+    for (int i = 0; i < w.planes.count; ++i) {
+        if (w.planes.planes[i].material >= 0) face &= ~equal(plane, (real)((scalar)i));
+    }
+    face &= ~(of_the_set(cut, w) & is_set_body(body_of_thing(cut, w), w));
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (w.objects[i].glass) face &= ~equal(cut, (real)((scalar)(i + 1)));
+    }
     const real one = R(1.0);
     pbr matt = *p;
     pbr_matt(&matt);
@@ -117,6 +126,6 @@ INLINE pbr pbr_found(stage s, const interaction *here, world w) {
         // (A blend of one material alone is not that material to the last bit. A single lane that is here has two.)
         p = LANES == 1 ? pbr_mixed(mix) : pbr_pick(flows, pbr_mixed(mix), p);
     }
-    if (any_lane(on_face(here))) pbr_of_face(here, &p);
+    if (any_lane(on_face(here))) pbr_of_face(here, &p, w);
     return p;
 }

@@ -1,15 +1,19 @@
-// The glass around a path. A body of glass is an object, with its number from 1, or the set, with the number after them all. Where several
+// The glass around a path. A body of glass is an object, with its number from 1, or one of the set's, with the numbers after them all: these
+// never overlap, as the march knows which of them is at a place. Where several
 // stand in each other the one with the highest number displaces the others (as nested dielectrics by priority: Schmidt and Budge 2002):
-// boundaries of those are not seen there. A path knows two at a place.
-
-#define THROUGH 1   // of an object's `glass`, where light goes through it: it may go below the boundary, too
+// boundaries of those are not seen there. A path knows MOST_BODIES at a place; of more it forgets the lowest. Where a path goes over
+// the boundary of an object the places of all objects tell which it is in then: so of bodies that touch, whose boundaries are at one
+// place but for rounding, either boundary is the one between both.
 
 // Below a boundary (subsurface) a body has a medium of its own, whose number is greater by a half.
 #define SKIN R(0.5)
 INLINE real body_of(real medium) { return floor(medium); }
 INLINE mask is_skin(real medium) { return less(floor(medium), medium); }
 
-INLINE real set_body(world w) { return (real)((scalar)(w.settings->object_count + 1)); }
+// Whether a path is in a body of the set, where rays of another kind follow it.
+INLINE mask is_within_set(const path_state *with, world w) {
+    return is_set_body(body_of(with->medium), w) & (HAS(w, GLASS_SET) ? ~0 : 0);
+}
 
 // What a material's own numbers say of a medium: its index, and what it takes away for each unit of the way, in natural logarithms.
 typedef struct {
@@ -96,30 +100,91 @@ CALLED medium medium_of(real body, world w) {
     medium found = {R(1.0), none, none, R(0.0)};
     if (!any_lane(less(R(0.0), body))) return found;
     for (int i = 0; i < w.settings->object_count; ++i) {
-        medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)(i + 1))), body, &found, w);
+        medium_of_material(w.objects[i].material, equal(body_of(body), (real)((scalar)w.objects[i].body)), body, &found, w);
     }
-    if (HAS(w, GLASS_SET)) medium_of_material(w.settings->set_material, equal(body_of(body), set_body(w)), body, &found, w);
+    if (HAS(w, GLASS_SET)) medium_of_material(w.settings->set_material, equal(body_of(body), (real)((scalar)w.settings->set_body)), body, &found, w);
+    return found;
+}
+
+// The bodies that a path is in, the highest first; 0 for none. Those under the first are one number: twice each, since skins have halves.
+#define MOST_BODIES 4
+#define BODY_DIGIT R(256.0)
+
+typedef struct {
+    real each[MOST_BODIES];
+} bodies;
+
+INLINE bodies bodies_of(const path_state *with) {
+    bodies found;
+    found.each[0] = with->medium;
+    real rest = with->under;
+    for (int i = 1; i < MOST_BODIES; ++i) {
+        const real next = floor(rest / BODY_DIGIT);
+        found.each[i] = R(0.5) * (rest - BODY_DIGIT * next);
+        rest = next;
+    }
+    return found;
+}
+
+INLINE void bodies_keep(path_state *with, bodies in) {
+    with->medium = in.each[0];
+    with->under = R(0.0);
+    for (int i = MOST_BODIES - 1; i > 0; --i) with->under = BODY_DIGIT * with->under + R(2.0) * in.each[i];
+}
+
+INLINE mask bodies_have(const bodies *in, real body) {
+    mask found = equal(body, body_of(in->each[0]));
+    for (int i = 1; i < MOST_BODIES; ++i) found |= equal(body, body_of(in->each[i]));
     return found;
 }
 
 // Goes into a body, or leaves it.
-INLINE void media_enter(path_state *with, real body, mask here) {
-    here &= ~equal(body_of(body), body_of(with->medium)) & ~equal(body_of(body), body_of(with->under));
-    const mask over = less(with->medium, body);
-    with->under = pick(here, pick(over, with->medium, fmax(with->under, body)), with->under);
-    with->medium = pick(here & over, body, with->medium);
+INLINE void bodies_enter(bodies *in, real body, mask here) {
+    real more = pick(here & ~bodies_have(in, body_of(body)), body, R(0.0));
+    for (int i = 0; i < MOST_BODIES; ++i) {
+        const real before = in->each[i];
+        in->each[i] = fmax(before, more);
+        more = fmin(before, more);
+    }
+}
+
+INLINE void bodies_leave(bodies *in, real body, mask here) {
+    mask gone = here & ~here;
+    for (int i = 0; i < MOST_BODIES; ++i) {
+        gone |= here & equal(body, body_of(in->each[i]));
+        in->each[i] = pick(gone, i + 1 < MOST_BODIES ? in->each[i + 1] : R(0.0), in->each[i]);
+    }
 }
 
 INLINE void media_leave(path_state *with, real body, mask here) {
-    const mask first = here & equal(body, body_of(with->medium)), second = here & equal(body, body_of(with->under));
-    with->medium = pick(first, with->under, with->medium);
-    with->under = pick(first | second, R(0.0), with->under);
+    if (!any_lane(here)) return;
+    bodies in = bodies_of(with);
+    bodies_leave(&in, body, here);
+    bodies_keep(with, in);
+}
+
+INLINE void media_enter(path_state *with, real body, mask here) {
+    if (!any_lane(here)) return;
+    bodies in = bodies_of(with);
+    bodies_enter(&in, body, here);
+    bodies_keep(with, in);
+}
+
+// The objects around a place, as far as light goes through them; of others that a path is in it is in those no longer that do not hold it.
+INLINE void bodies_around(bodies *in, vec place, mask here, world w) {
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        if (!w.objects[i].glass) continue;
+        const real body = (real)((scalar)(i + 1));
+        const mask held = object_left(i, place, w.objects, w.planes);
+        if (w.objects[i].glass == THROUGH) bodies_enter(in, body, here & held);
+        bodies_leave(in, body, here & ~held);
+    }
 }
 
 // The way through a medium to what a path has met. The set ends where its bounds do, though its exit may not be found.
 INLINE real way_within(const path_state *with, real way, world w) {
     const real most = R(2.0) * (real)(w.settings->bounds_radius);
-    return pick(equal(body_of(with->medium), set_body(w)), fmin(way, most), way);
+    return pick(is_set_body(body_of(with->medium), w), fmin(way, most), way);
 }
 
 // Lets a clear medium absorb light on a path's way to what it has met.
@@ -137,11 +202,11 @@ INLINE void media_found(path_state *with, medium found, mask here) {
 
 // The open around the eye, or the glass that it is in.
 INLINE void media_begin(path_state *with, vec eye, world w) {
-    with->medium = with->under = R(0.0);
+    bodies in = {{R(0.0)}};
+    bodies_around(&in, eye, less(R(0.0), R(1.0)), w);
+    bodies_enter(&in, (real)((scalar)w.settings->eye_body), less(R(0.0), R(1.0)));
+    bodies_keep(with, in);
     with->wave = R(-1.0);
-    for (int i = 0; i < w.settings->object_count; ++i) {
-        if (w.objects[i].glass == THROUGH) media_enter(with, (real)((scalar)(i + 1)), object_holds(w.objects + i, eye));
-    }
     media_found(with, medium_of(with->medium, w), less(R(0.0), R(1.0)));
 }
 
@@ -149,35 +214,67 @@ INLINE void media_begin(path_state *with, vec eye, world w) {
 typedef struct {
     real body;
     mask leaving;    // whether the path comes from inside the body
-    mask hidden;     // whether the body is displaced here: the path goes straight on
+    mask glass;      // whether it can go over the boundary
+    mask hidden;     // whether there is none here, as the body is displaced, or the same matter is beyond: the path goes straight on
     real around;     // the glass that the body stands in, or 0
+    real inner;      // the glass on its inner side: the body's, but where one that touches it displaces it
+    bodies beyond;   // those that the path is in if it goes over the boundary
 } border;
+
+// What a body's glass is made of: the number of its material; of none and of skins -1.
+INLINE real matter_of(real body, world w) {
+    real found = pick(equal(body, (real)((scalar)w.settings->set_body)), (real)((scalar)w.settings->set_material), R(-1.0));
+    for (int i = 0; i < w.settings->object_count; ++i) {
+        found = pick(equal(body, (real)((scalar)w.objects[i].body)), (real)((scalar)w.objects[i].material), found);
+    }
+    return found;
+}
+
+// Where a path leaves a body of the set the one of its bodies that is beyond; of what light only goes below, and in the open, 0.
+INLINE real body_beyond(const interaction *here, world w) {
+    return pick(less(here->other, (real)((scalar)w.settings->first_skin)), here->other, R(0.0));
+}
+
+#define TOUCHES R(8.0)   // by how many of a place's lifts bodies are apart that touch
 
 INLINE border border_at(const path_state *with, const interaction *here, mask lands, world w) {
     border found;
-    mask glass = lands & (HAS(w, GLASS_SET) ? ~0 : 0);
-    found.body = set_body(w);
-    found.leaving = equal(body_of(with->medium), found.body) | equal(body_of(with->under), found.body);
-    // What is joined to the set is one body with it.
-    const mask beside = less(R(0.0), here->object) & ~of_the_set(here->object, w);
-    found.body = pick(beside, here->object, found.body);
-    glass &= ~beside;
-    found.leaving &= ~beside;
+    const real object = thing_cut(here->object), before = body_of(with->medium);
+    const mask of_set = of_the_set(object, w), beside = less(R(0.0), object) & ~of_set;
+    found.body = body_of_thing(object, w);
+    found.beyond = bodies_of(with);
+    found.glass = lands & of_set & is_set_body(found.body, w);
+    found.leaving = of_set & bodies_have(&found.beyond, found.body);
     for (int i = 0; i < w.settings->object_count; ++i) {
-        const mask this_one = beside & equal(here->object, (real)((scalar)(i + 1)));
+        const mask this_one = beside & equal(object, (real)((scalar)(i + 1)));
         if (!w.objects[i].glass || !any_lane(this_one)) continue;
-        glass |= this_one & lands;
+        found.glass |= this_one & lands;
         // The interaction's normal is towards the viewer.
-        found.leaving |= this_one & less(vec_dot(object_normal(w.objects + i, here->seen, w.tables), here->normal), R(0.0));
+        const vec outward = thing_normal(here->object, w.objects + i, here->seen, w.planes, w.tables);
+        found.leaving |= this_one & less(vec_dot(outward, here->normal), R(0.0));
     }
-    found.around = pick(equal(body_of(with->medium), found.body), with->under, with->medium);
-    found.hidden = glass & less(found.body, found.around);
+    const mask enters = found.glass & ~found.leaving, leaves = found.glass & found.leaving;
+    if (any_lane(found.glass & beside)) {
+        const vec beyond = vec_along(here->point, -TOUCHES * lift_of(here, w), here->normal);
+        bodies_around(&found.beyond, beyond, found.glass & beside, w);
+    }
+    bodies_leave(&found.beyond, before, enters & of_set & is_set_body(before, w));
+    bodies_enter(&found.beyond, found.body, enters);
+    bodies_leave(&found.beyond, found.body, leaves);
+    bodies_enter(&found.beyond, body_beyond(here, w), leaves & of_set);
+    const real from = pick(leaves, fmax(with->medium, found.body), with->medium), to = found.beyond.each[0];
+    found.around = pick(found.leaving, to, from);
+    found.inner = pick(found.leaving, from, to);
+    const real matter = matter_of(from, w), plane = plane_of_face(here->object);
+    found.hidden = found.glass & (equal(from, to) | (less_equal(R(0.0), matter) & equal(matter, matter_of(to, w))));
+    // A face with a material of its own covers the glass there.
+    for (int i = 0; i < w.planes.count; ++i) {
+        if (w.planes.planes[i].material >= 0) found.hidden &= ~equal(plane, (real)((scalar)i));
+    }
     return found;
 }
 
 // Whether a path comes from below the boundary of an interaction, which it then leaves as if it were seen from outside, straight on.
 INLINE mask path_emerges(int bounce, const path_state *with, const interaction *here, world w) {
-    real body = set_body(w);
-    body = pick(of_the_set(here->object, w), body, here->object);
-    return is_skin(with->medium) & equal(body_of(with->medium), body) & (bounce > 0 ? ~0 : 0);
+    return is_skin(with->medium) & equal(body_of(with->medium), body_of_thing(thing_cut(here->object), w)) & (bounce > 0 ? ~0 : 0);
 }

@@ -12,7 +12,7 @@ INLINE void path_flies(path *so_far, real way, mask here) {
 
 // Whether nothing at all is in the way of a flight, as far as is known here: only the march knows where the set is.
 INLINE mask flight_is_free(const path *so_far, const path_state *with, mask here, world w) {
-    here &= less(body_of(with->medium), set_body(w)) & less(with->flight, (real)(REAL_LARGEST));
+    here &= ~is_set_body(body_of(with->medium), w) & less(with->flight, (real)(REAL_LARGEST));
     if (HAS(w, CLOUDS)) here &= ~here;   // they may be in the way, too
     if (!any_lane(here)) return here;
     ray r = {so_far->origin, so_far->direction, R(0.0), with->flight, so_far->footprint, so_far->spread, RAY_NOTHING_KNOWN};

@@ -131,10 +131,13 @@ def test_damaged_facts(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPat
         shutil.copy(good / "cache" / "lanes.json", fact)
         damage(fact)
     assert again(good, tmp_path).err == ""
-    measures(tmp_path)
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
-    found = {section: set(cache.recall(section)) for section in SECTIONS}
-    assert all(found.values())
+    for _ in range(6):  # what is measured while other tests have the processor's cores is not kept
+        measures(tmp_path)
+        found = {section: set(cache.recall(section)) for section in SECTIONS}
+        if all(found.values()):
+            break
+    assert all(found.values()), "six measurements, and something else had the cores in each"
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(good / "cache"))
     assert found["lanes"] >= set(cache.recall("lanes")) > set()
 

@@ -165,8 +165,8 @@ def test_it_goes_with_an_interrupt(tmp_path: Path) -> None:
     (tmp_path / "tmp").mkdir()
     order = ("render", "scene.yaml", "-o", "a.exr", "--quiet")
     running = Running(tmp_path, *order, extra={"TMPDIR": str(tmp_path / "tmp")})
-    running.wait_until((tmp_path / "a.exr.partial").exists)
-    assert list((tmp_path / "tmp").rglob("*.lock"))
+    begun, drivers = tmp_path / "a.exr.partial", tmp_path / "tmp"
+    running.wait_until(lambda: begun.exists() and any(drivers.rglob("*.lock")))
     assert running.ended_by(signal.SIGTERM)[0] == 143
     assert [path.name for path in (tmp_path / "tmp").rglob("*") if path.name != "running"] == [
         path.name for path in (tmp_path / "tmp").iterdir()

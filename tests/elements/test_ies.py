@@ -176,7 +176,9 @@ def test_all_factors_count(tmp_path: Path) -> None:
     tilt = "TILT=INCLUDE\n1\n3\n0 45 90\n0.5 0.4 0.3"
     path.write_text(text_of([0], values, vertical=[0, 45, 90], tilt=tilt, multiplier=3, ballast=0.8))
     rows = (values[0] * 3 * 0.8 * 0.5 / 1000).tolist()
-    assert IesLight.table_of(path) == pytest.approx([3, 2, 0, 45, 90, 0, 360, *rows, *rows])
+    table = IesLight.table_of(path)
+    assert table == pytest.approx([3, 2, 0, 45, 90, 0, 360, *rows, *rows])
+    assert IesLight.most_of(table) == pytest.approx(rows[0])
 
 
 def test_half_symmetric_files_without_a_row_at_180_are_closed(tmp_path: Path) -> None:

@@ -21,7 +21,9 @@ from clfractal.device.select import Device, sees_host_writes
 from clfractal.device.structs import Precision
 from clfractal.device.watched import CANCELLED, Watched, is_watched
 from clfractal.engine.job import Job
+from clfractal.engine.job_framebuffers import JobFramebuffers
 from clfractal.engine.local_executor import LocalExecutor
+from clfractal.engine.prepare import prepare
 from clfractal.engine.refine import pass_ranges
 from clfractal.engine.run import Progress, run
 from clfractal.formulas.catalog import load_chain
@@ -149,6 +151,29 @@ def test_a_pace_begins_with_what_is_safe_for_the_heaviest() -> None:
     assert pace.size > 1000
     pace.begin()
     assert pace.size == pytest.approx(5)
+
+
+def test_a_launch_of_many_kernels_is_no_small_one(device: Device) -> None:
+    """With less time than its kernels' own each launch would be smaller than the one before, down to a packet."""
+    scene = {
+        "version": 1,
+        "formula": "none",
+        "image": {"width": 80, "height": 80},
+        "camera": {"position": [0, -4, 0]},
+        "lighting": {"mode": "path", "bounces": 128},
+        "objects": {"ball": {"type": "sphere"}},
+        "renderer": {"samples": 1},
+    }
+    executor = LocalExecutor(device)
+    job = prepare(clfractal.load_scene(scene), device)
+    run(job, JobFramebuffers(job).framebuffers, executor)
+    (drawing,) = executor._drawings.values()
+    assert drawing.kernels > 500
+    assert drawing.view is not None
+    for _ in range(10):
+        drawing.pace.learn(drawing.pace.size, 1000)
+    assert drawing.pace.size * drawing.view.plan.lanes > 4096
+    assert drawing.pace.seconds > 0.1
 
 
 @pytest.mark.parametrize("error", [RuntimeError, KeyboardInterrupt])

@@ -27,12 +27,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except MissingCompilerError as error:
         return _wrong(str(error))
     known = record.load()
-    whole_record = asked.record and asked.only == ["*"]
-    if not whole_record and found.versions != known.versions:
-        return _wrong(
-            f"the record is of {_said(known.versions)}, and here is {_said(found.versions)}: install the same,"
-            " or make another record (--record)"
-        )
+    if found.versions != known.versions:
+        if not asked.record or asked.only != ["*"]:
+            return _wrong(
+                f"the record is of {_said(known.versions)}, and here is {_said(found.versions)}: install the same,"
+                " or make another record (--record)"
+            )
+        known = record.Record(found.versions, {})
     chosen = listing.unlike(listing.everything() if asked.all or asked.record else listing.paired())
     programs = [each for each in chosen if any(fnmatch.fnmatch(each.name, name) for name in asked.only)]
     texts = _sums(found, programs, asked.jobs)
@@ -45,7 +46,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     if not programs:
         return _wrong(f"no program is called {' or '.join(asked.only)}")
-    if asked.known:
+    if asked.known or asked.record:
         changed = [each for each in programs if texts[each.name] != known.texts.get(each.name)]
         print(f"{len(programs) - len(changed)} programs are what they were when their figures were recorded")
         programs = changed
@@ -78,7 +79,11 @@ def _asked(arguments: Sequence[str] | None) -> argparse.Namespace:
     parser.add_argument(
         "--known", action="store_true", help="only programs that are on record, and whose texts have changed"
     )
-    parser.add_argument("--record", action="store_true", help="compile all, and put the figures on record")
+    parser.add_argument(
+        "--record",
+        action="store_true",
+        help="compile what is not on record as it is now, and put the figures there",
+    )
     parser.add_argument(
         "--only", nargs="+", default=["*"], metavar="NAME", help="programs of such names: 'march *'"
     )

@@ -18,12 +18,10 @@ from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
 from clfractal.formulas.opencl import write_formula
 from clfractal.scene.checks import MAX_PLANES
-from clfractal.scene.lighting import MAX_LIGHTS
-from clfractal.shading.light_records import LIGHT
 from tests.gpu import __main__ as command
 from tests.gpu import compilers, limits, listing, record, table
 from tests.gpu.compilers import Compilers, MissingCompilerError, RejectedError
-from tests.gpu.figures import GPUS, Figures, of_amd, of_ptxas
+from tests.gpu.figures import GPUS, Figures
 from tests.gpu.pairs import Pair, covering
 from tests.gpu.record import Record
 
@@ -38,6 +36,7 @@ STACK = """__kernel void stack(__global float *a, int at) {
     a[at] = kept[(at + 1) & 63];
 }
 """
+GREEDY = STACK.replace("stack", "small")
 
 
 @cache
@@ -88,11 +87,11 @@ def test_what_is_rejected(text: str, told: str) -> None:
         of(text + "\n")
 
 
-def run(monkeypatch: pytest.MonkeyPatch, known: Record, *arguments: str) -> int:
+def run(monkeypatch: pytest.MonkeyPatch, known: Record, *arguments: str, text: str = SMALL) -> int:
     """The command with one small program for each number type, and this record."""
     found()
     programs = [
-        listing.Listed(f"small {precision}", precision, FlatText(SMALL, SourceMap()))
+        listing.Listed(f"small {precision}", precision, FlatText(text, SourceMap()))
         for precision in listing.PRECISIONS
     ]
     monkeypatch.setattr(listing, "paired", lambda: programs)
@@ -114,9 +113,9 @@ def test_the_command_says_what_is_worse(
     said = capsys.readouterr()
     assert "small float64 | small: sm_75 " in said.out
     assert "2 kernels need less than on record" in said.out
-    assert run(monkeypatch, known(1), "--only", "*32") == 1
+    assert run(monkeypatch, known(255), "--only", "*32", text=GREEDY) == 1
     said = capsys.readouterr()
-    assert said.err.count("were 1\n") == len(GPUS)
+    assert said.err.count(": stack 2") == said.err.count(", were 0\n") == len(GPUS)
     assert "float64" not in said.out
 
 
@@ -129,10 +128,16 @@ def test_figures_of_other_compilers_are_not_compared(
     assert run(monkeypatch, known(255), "--only", "nothing") == 2
 
 
+@pytest.mark.parametrize("chosen", [("--only", "*32"), ()], ids=["named", "changed"])
 def test_recording_some_programs_keeps_the_others_that_there_are(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, chosen: tuple[str, ...]
 ) -> None:
     old = known(255)
+    sums = {
+        f"small {each}": record.sum_of(compilers.shown(found(), SMALL, each)) for each in listing.PRECISIONS
+    }
+    if not chosen:  # the other is on record as it is
+        old = replace(old, texts={"small float64": sums["small float64"]})
     gone = replace(old, figures={**old.figures, "gone float32 | gone": {"sm_75": Figures(9)}})
     page = tmp_path / "page.md"
     page.write_text(table.BEGIN + table.END, encoding="utf-8")
@@ -140,21 +145,21 @@ def test_recording_some_programs_keeps_the_others_that_there_are(
     monkeypatch.setattr(table, "PAGE", page)
     made: list[Record] = []
     monkeypatch.setattr(record, "save", made.append)
-    assert run(monkeypatch, gone, "--record", "--only", "*32") == 0
+    assert run(monkeypatch, gone, "--record", *chosen) == 0
     (new,) = made
     assert set(new.figures) == set(old.figures)
     assert new.figures["small float32 | small"]["sm_75"].registers < 255
     assert new.figures["small float64 | small"]["sm_75"].registers == 255
-    assert new.texts == {"small float32": record.sum_of(compilers.shown(found(), SMALL, "float32"))}
+    assert new.texts == {name: sums[name] for name in ("small float32", *old.texts)}
     assert "| `small` | float64 | 1 | 255, 8 warps |" in page.read_text(encoding="utf-8")
 
 
 def test_known_programs_are_compiled_when_their_text_has_changed(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    same = record.sum_of(compilers.shown(found(), "// A remark.\n" + SMALL, "float32"))
+    same = record.sum_of(compilers.shown(found(), "// A remark.\n" + GREEDY, "float32"))
     texts = {"small float32": same, "small float64": record.sum_of("another")}
-    assert run(monkeypatch, replace(known(1), texts=texts), "--known") == 1
+    assert run(monkeypatch, replace(known(1), texts=texts), "--known", text=GREEDY) == 1
     said = capsys.readouterr()
     assert "1 programs are what they were" in said.out
     assert said.err.count("small float64 | small: ") == len(GPUS)
@@ -169,94 +174,6 @@ def test_without_compilers_it_says_what_to_install(
     assert capsys.readouterr().err.startswith(
         "gpu-check: compilers for GPUs are missing: apt-get install clang-16 libclc-16"
     )
-
-
-# --- figures ---
-
-
-PTXAS = """ptxas info    : 0 bytes gmem, 208 bytes cmem[4]
-ptxas info    : Compiling entry function 'first' for 'sm_75'
-ptxas info    : Function properties for first
-    240 bytes stack frame, 24 bytes spill stores, 32 bytes spill loads
-ptxas info    : Used 168 registers, used 1 barriers, 4096 bytes smem, 492 bytes cmem[0]
-ptxas info    : Compile time = 12.345 ms
-ptxas info    : Compiling entry function 'second' for 'sm_75'
-ptxas info    : Function properties for second
-    0 bytes stack frame, 0 bytes spill stores, 0 bytes spill loads
-ptxas info    : Used 18 registers, 400 bytes cmem[0]
-"""
-
-AMD = """
-	.amdhsa_kernel first
-	.amdhsa_kernel second
-amdhsa.kernels:
-  - .args:
-      - .address_space:  global
-        .name:           out
-        .offset:         0
-    .group_segment_fixed_size: 512
-    .name:           first
-    .private_segment_fixed_size: 136
-    .sgpr_spill_count: 25
-    .symbol:         first.kd
-    .vgpr_count:     195
-    .vgpr_spill_count: 3
-    .wavefront_size: 32
-  - .args:           []
-    .group_segment_fixed_size: 0
-    .name:           second
-    .private_segment_fixed_size: 0
-    .vgpr_count:     11
-    .vgpr_spill_count: 0
-amdhsa.target:   amdgcn-amd-amdhsa--gfx1030
-amdhsa.version:
-  - 1
-  - 1
-"""
-
-
-def test_what_ptxas_says() -> None:
-    assert of_ptxas(PTXAS) == {"first": Figures(168, 240, 24, 4096), "second": Figures(18)}
-
-
-def test_what_stands_in_assembly_for_amd() -> None:
-    """A register that is spilled takes four bytes; names of arguments are no kernels."""
-    assert of_amd(AMD) == {"first": Figures(195, 136, 12, 512), "second": Figures(11)}
-
-
-def test_a_kernel_without_metadata_is_noticed() -> None:
-    with pytest.raises(ValueError, match="third"):
-        of_amd(AMD.replace("\t.amdhsa_kernel second", "\t.amdhsa_kernel second\n\t.amdhsa_kernel third"))
-
-
-@pytest.mark.parametrize(
-    ("name", "registers", "expected"),
-    [
-        # CUDA's occupancy calculator, of registers alone.
-        *(("sm_75", 64, 32), ("sm_75", 65, 28), ("sm_75", 96, 20), ("sm_75", 168, 12), ("sm_75", 255, 8)),
-        *(("sm_90", 1, 64), ("sm_90", 32, 64), ("sm_90", 33, 48), ("sm_90", 96, 20), ("sm_90", 255, 8)),
-        # What LLVM writes into its assembly, of two SIMDs.
-        *(("gfx1030", 64, 32), ("gfx1030", 85, 20), ("gfx1030", 175, 10), ("gfx1030", 256, 8)),
-        *(("gfx1100", 96, 32), ("gfx1100", 171, 16), ("gfx1100", 256, 10)),
-    ],
-)
-def test_how_many_fit_beside_each_other(name: str, registers: int, expected: int) -> None:
-    (gpu,) = [gpu for gpu in GPUS if gpu.name == name]
-    assert gpu.occupancy(Figures(registers)) == expected
-
-
-def test_local_memory_leaves_room_for_fewer_groups() -> None:
-    by_name = {gpu.name: gpu for gpu in GPUS}
-    assert by_name["gfx1030"].occupancy(Figures(48, local=16 * 1024)) == 8
-    assert by_name["sm_90"].occupancy(Figures(48, local=16 * 1024)) == 28
-    assert by_name["sm_75"].occupancy(Figures(255, local=1)) == 8
-
-
-def test_what_is_worse() -> None:
-    old = Figures(96, 0, 0)
-    assert not old.worse_than(old)
-    assert not Figures(95).worse_than(old)
-    assert Figures(97, 8).worse_than(old) == ["registers 97, were 96", "stack 8, were 0"]
 
 
 # --- limits ---
@@ -333,8 +250,7 @@ def test_words_that_devices_lack(code: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_the_longest_lists_fit_constant_memory(precision: Precision) -> None:
-    """Lights, and the orbits of the object and of all planes; constants of a formula of the library are few."""
-    assert MAX_LIGHTS * LIGHT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    """The orbits of the object and of all planes; constants of a formula of the library are few."""
     assert (1 + MAX_PLANES) * ORBIT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
     most = max(len(write_formula(catalog.load_chain(name)).constants) for name in catalog.names())
     assert 0 < 100 * most * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
@@ -423,8 +339,9 @@ def test_what_is_worse_is_told_and_nothing_else() -> None:
     name = "march hast float32 | march"
     assert not list(record.worse(KNOWN.figures, KNOWN))
     assert list(record.worse({name: {"sm_75": Figures(97), "gfx1030": Figures(80)}}, KNOWN)) == [
-        f"{name}: sm_75: registers 97, were 96"
+        f"{name}: sm_75: 16 warps, were 20 (registers 97, were 96)"
     ]
+    assert not list(record.worse({name: {"sm_75": Figures(96), "gfx1030": Figures(86)}}, KNOWN))
     assert list(record.worse({"march hast float64 | march": {"sm_75": Figures(1)}}, KNOWN)) == [
         "march hast float64 | march: not on record"
     ]

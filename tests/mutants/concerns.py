@@ -40,6 +40,7 @@ kernels/elements/shapes/*: render/objects render/joined render/emitter_places
 kernels/elements/materials/*: render/materials render/layers render/glass render/furnaces
 kernels/geometry/object_grids.h: render/object_grids render/turned_grids
 kernels/geometry/clouds.h: render/clouds
+kernels/integrators/*cloud*: render/clouds render/lane_shares
 kernels/shading/medium_event.h: render/clouds render/volume_paths
 kernels/integrators/volume/volume_bounds.h: render/volume_paths
 clfractal/shading/transfer.py: render/clouds render/volume_paths voxels/lattice

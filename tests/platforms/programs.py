@@ -63,7 +63,8 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
 
-# What none of the pictures has: exact normals of a grid, a grid along paths, clear glass, and costly parts of materials.
+# What none of the pictures has: exact normals of a grid, a grid along paths, clear glass, costly parts of materials, light
+# that water, balls and other shapes bend, and light that is sought.
 _MORE: dict[str, dict[str, Any]] = {
     "exact": {"renderer": {"type": "volume", "normals": "exact"}},
     "lit": {
@@ -82,6 +83,21 @@ _MORE: dict[str, dict[str, Any]] = {
         "lighting": {"mode": "path"},
         "materials": {"film": {"thin_film": {"weight": 1}, "specular": {"anisotropy": 0.5}}},
         "material": {"name": "film"},
+    },
+    "bent": {
+        "lighting": {"mode": "path"},
+        "materials": {"water": {"specular": {"roughness": 0}, "transmission": {"weight": 1}}},
+        "objects": {"sea": {"type": "water", "waves": {"height": 0}, "material": "water"}},
+    },
+    "bent shapes": {
+        "lighting": {"mode": "path"},
+        "materials": {"glass": {"specular": {"roughness": 0}, "transmission": {"weight": 1}}},
+        "objects": {"block": {"type": "box", "material": "glass"}},
+    },
+    "sought": {
+        "lighting": {"mode": "path"},
+        "materials": {"embers": {"emission": {"luminance": {"by": "iterations"}}}},
+        "material": {"name": "embers"},
     },
 }
 

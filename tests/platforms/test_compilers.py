@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import re
 from functools import cache
+from itertools import islice
 
 import pytest
 
@@ -20,6 +21,9 @@ from tests.variants import every, one_of
 
 EXPECTED = "CLFRACTAL_EXPECT_CLANG"
 """Set to 1: a missing clang is a failure, not a reason to skip."""
+
+PARTS = 4
+"""So many tests share the programs of a GPU's maker: all at once take minutes."""
 
 # A text has more functions than each program calls.
 _WARNINGS = ("-Wall", "-Werror", "-Wno-unused", "-Wno-unused-command-line-argument")
@@ -74,10 +78,11 @@ def test_every_formula_of_the_library_is_opencl_1_2() -> None:
     checked(list(of_formulas()), "float32")
 
 
+@pytest.mark.parametrize("part", range(PARTS))
 @pytest.mark.parametrize("maker", one_of(*GPUS))
-def test_every_program_becomes_code_of_a_gpu(maker: str) -> None:
+def test_every_program_becomes_code_of_a_gpu(maker: str, part: int) -> None:
     """With numbers of 32 bits alone, and calls of nothing but its own functions and OpenCL's (whose names are mangled)."""
-    for name, program in every_text(1, "float32", EVERY_KIND):
+    for name, program in islice(every_text(1, "float32", EVERY_KIND), part, None, PARTS):
         code = compiled(program.text, "float32", GPUS[maker])
         assert not _FLOAT64.findall(code), name
         foreign = {

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from functools import cache
 from typing import Any
 
 import numpy as np
+import pytest
 from scipy.stats import qmc
 
 from clfractal.device.select import choose
@@ -17,6 +19,7 @@ from clfractal.geometry.planes import CUT_PLANE
 from clfractal.integrators.declarations import struct_text
 from clfractal.scene.model import Scene
 from clfractal.schema.shape import Solid
+from clfractal.shading import emitters
 from tests.render.objects_oracle import NOWHERE
 from tests.render.shots import PERSPECTIVE, Floats
 from tests.scenes import scene_of
@@ -54,6 +57,14 @@ __kernel void look(__global const scalar *in, __global scalar *out, __global con
     store(out + 5 * count, emitter_weight(o, &point));
 }}
 """
+
+
+@contextmanager
+def chance_alone() -> Iterator[None]:
+    """Light that would have to be sought is found by chance alone meanwhile."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(emitters, "may_seek", lambda scene: False)
+        yield
 
 
 def shining(solid: dict[str, Any]) -> Scene:

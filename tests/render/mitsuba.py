@@ -58,12 +58,15 @@ def by_mitsuba(text: str, told: dict[str, Any], folder: Path) -> Floats:
     return np.asarray(np.load(path), np.float64)
 
 
-def by_us(seeds: int, renderer: dict[str, Any], **sections: Any) -> Floats:
-    """Pictures of a scene, one of each seed, shape (seeds, height, width, 3)."""
-    films = [
-        clfractal.render({"version": 1, "renderer": {**renderer, "seed": seed}, **sections})
+def by_us(seeds: int, renderer: dict[str, Any], *, folder: Path | None = None, **sections: Any) -> Floats:
+    """Pictures of a scene with files in a folder, one of each seed, shape (seeds, height, width, 3)."""
+    scenes = [
+        clfractal.load_scene(
+            {"version": 1, "renderer": {**renderer, "seed": seed}, **sections}, folder=folder
+        )
         for seed in range(seeds)
     ]
+    films = [clfractal.render(scene) for scene in scenes]
     return np.stack([np.stack([film[name] for name in "RGB"], axis=-1) for film in films]).astype(float)
 
 

@@ -221,6 +221,39 @@ def test_layers_have_the_light_of_clouds(device: Device, folder: Path) -> None:
     np.testing.assert_allclose(sum(framebuffer[name] for name in layers), framebuffer["R"], atol=1e-6)
 
 
+def test_the_direct_light_of_a_cloud_is_scattered_once(device: Device, folder: Path) -> None:
+    """However often light is scattered in all: paths go on from the same first place."""
+    lights = [{"direction": [-1, 0.4, -0.5], "intensity": 3}]
+    direct, indirect = [], []
+    for bounces in (0, 6):
+        scene = scene_of(
+            folder, {"cloud": cloud("ball.nrrd", 0.95, 0.4)}, bounces=bounces, samples=4, lights=lights
+        )
+        framebuffer = shoot(scene, device, channels=["R", "direct.R", "indirect.R"])
+        direct.append(framebuffer["direct.R"])
+        indirect.append(framebuffer["indirect.R"].mean())
+    np.testing.assert_allclose(direct[0], direct[1], rtol=1e-5, atol=1e-6)
+    assert indirect[0] == pytest.approx(0, abs=1e-6)
+    assert indirect[1] > 0.2 * direct[1].mean()
+
+
+def test_a_white_cloud_around_a_white_set(device: Device, folder: Path) -> None:
+    """Rays to an environment that is asked for may meet the set, and its own the cloud: all stays white."""
+    from tests.environment_maps import write_map
+
+    write_map(folder / "white.exr", 1.0)
+    scene = scene_of(
+        folder,
+        {"cloud": cloud("ball.nrrd", 1.0, 0.5, anisotropy=0.3, position=[0.3, -0.4, 0.2])},
+        formula={"name": "mandelbulb", "iterations": 3},
+        bounces=64,
+        samples=32,
+        environment={"file": "white.exr"},
+        **WHITE,
+    )
+    assert abs(light_of(scene, device).mean() - 1) < 0.01
+
+
 @pytest.mark.combination
 def test_a_white_cloud_in_a_white_room_with_glass(device: Device, folder: Path) -> None:
     """An environment that is asked for, a ball of glass and one of milk in the cloud: all stays white."""

@@ -15,7 +15,7 @@ from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from tests import scenes
-from tests.render.cut_oracle import BODIES, PLANES, WHITE, Met, face_tint, first_met, scene_of
+from tests.render.cut_oracle import BODIES, MIRROR, PLANES, WHITE, Met, face_tint, first_met, scene_of
 from tests.render.shots import CHANNELS as EVERY
 from tests.render.shots import Floats, normals_of, points_of, rays, shoot, stacked
 from tests.variants import one_of
@@ -123,6 +123,30 @@ def test_a_lamp_lights_faces_as_lambert_says(device: Device) -> None:
         direction,
         lambda tint, normal: 0.7 * tint * np.maximum(normal @ toward, 0)[..., None],
     )
+
+
+def test_faces_have_materials(device: Device) -> None:
+    """One that shines, on the set; and one without a colour, which is the plane's, on the crate."""
+    lamp = {
+        "base": {"weight": 0},
+        "specular": {"weight": 0},
+        "emission": {"luminance": 2, "color": [0.5, 0.2, 0.1]},
+    }
+    scene = scene_of(
+        lighting={"mode": "path", "bounces": 0},
+        materials={"mirror": MIRROR, "lamp": lamp, "half": {"base": {"weight": 0.5}}},
+        cut_planes=[{**PLANES[0], "material": "lamp"}, {**PLANES[1], "material": "half"}],
+    )
+    framebuffer = framebuffer_of(scene, device)
+    found, _, _ = met_by_eye(scene)
+    set_face, crate_face = (found.sure & (found.body == body) & (found.plane >= 0) for body in (0, 1))
+    assert min(set_face.sum(), crate_face.sum()) > 80
+    shown = stacked(framebuffer, "RGB")
+    np.testing.assert_allclose(
+        shown[set_face], np.broadcast_to([1, 0.4, 0.2], shown[set_face].shape), atol=1e-3
+    )
+    albedo = stacked(framebuffer, ALBEDO)[crate_face]
+    np.testing.assert_allclose(albedo, np.broadcast_to([0.05, 0.3, 0.1], albedo.shape), atol=2e-4)
 
 
 def test_faces_throw_no_shadow_on_themselves(device: Device) -> None:

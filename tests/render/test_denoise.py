@@ -105,7 +105,11 @@ def test_values_that_are_no_light_do_no_harm() -> None:
 
 # Branches up to far away, finer than pixels there, behind fog that lies over the ground.
 FOGGED: dict[str, Any] = {
-    "formula": {"name": "pseudo_kleinian", "iterations": 7},
+    "formula": {
+        "name": "pseudo_kleinian",
+        "parameters": {"size": 1, "box_x": 0.92436, "box_y": 0.90756, "box_z": 0.92436, "sheet": 0.03},
+        "iterations": 7,
+    },
     "image": {"width": 240, "height": 135},
     "camera": {"position": [0.2, -1.6, 0.5], "target": [0, 0.4, 0.2], "fov": 60},
     "lighting": path(3),

@@ -101,7 +101,7 @@ _TEXT = f"""\
 #include "elements/lights/area_lights/rectangle.h"
 {LOADS}
 // Planes of `count` numbers. In: u, v. Out: the direction, its density.
-__kernel void look(__global const scalar *in, __global scalar *out, __constant struct Light *light, scalar x, scalar y,
+__kernel void look(__global const scalar *in, __global scalar *out, light_record light, scalar x, scalar y,
                    scalar z, int count) {{
     const int lane = (int)get_global_id(0) * LANES;
     in += lane;

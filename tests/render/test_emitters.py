@@ -9,27 +9,14 @@ import pytest
 
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
-from clfractal.shading.emitters import sampled_radiance
+from clfractal.shading.emitters import emitters_of, sampled_radiance
 from tests.render.bits import alike_by_lanes
-from tests.render.objects_oracle import NOWHERE
-from tests.render.shots import Floats, points_of, shoot, stacked
-from tests.scenes import scene_of
+from tests.render.emitter_choices import chance_alone
+from tests.render.glowing import BY_CHANCE, COLOR, DULL, GLOW, MATERIALS, blocks, colors, lit
+from tests.render.shots import Floats, normals_of, points_of, shoot, stacked
 from tests.variants import one_of
 
 pytestmark = pytest.mark.light
-
-SIZE = (24, 24)
-# From below what shines above, down to the floor.
-CAMERA = {"position": [0.1, -0.05, 0.45], "target": [0.1, -0.05, 0], "up": [0, 1, 0], "fov": 120}
-BLACK = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
-FLOOR = {"type": "plane", "material": "white"}
-COLOR = np.array([1, 0.5, 0.25])
-DULL = {"weight": 0}
-GLOW = {"base": {"color": [0, 0, 0]}, "specular": DULL, "emission": {"luminance": 6, "color": COLOR.tolist()}}
-# The same light as a map, which nobody asks for.
-EVEN = {"by": "height", "curve": [[0, 6], [1, 6]]}
-BY_CHANCE = {**GLOW, "emission": {"luminance": EVEN, "color": COLOR.tolist()}}
-MATERIALS = {"white": {"base": {"color": [1, 1, 1]}, "specular": DULL}, "glow": GLOW}
 
 LAMPS: dict[str, dict[str, Any]] = {
     "ball": {"type": "sphere", "position": [0.3, 0.1, 0.9], "radius": 0.3},
@@ -49,33 +36,8 @@ TURNS: dict[str, tuple[float, float, float]] = {
 }
 
 
-def lit(
-    objects: dict[str, Any], samples: int, bounces: int = 0, camera: Any = CAMERA, **sections: Any
-) -> Scene:
-    """Objects over a white floor, in their own light."""
-    values: dict[str, Any] = {
-        "lights": [],
-        "background": BLACK,
-        "lighting": {"mode": "path", "bounces": bounces, "roulette": bounces},  # less noise
-        "materials": MATERIALS,
-        "objects": {"floor": FLOOR, **objects},
-        "renderer": {"samples": samples, "detail": 0.1},
-        **sections,
-    }
-    return scene_of(NOWHERE, camera, SIZE, **values)
-
-
 def lamp(name: str) -> dict[str, Any]:
     return {**LAMPS[name], "rotation": list(TURNS[name]), "material": "glow"}
-
-
-def colors(scene: Scene, device: Device, **settings: Any) -> Floats:
-    return stacked(shoot(scene, device, **settings), ("R", "G", "B")).astype(float)
-
-
-def blocks(picture: Floats) -> Floats:
-    """Means of blocks of 6 x 6 pixels."""
-    return np.asarray(picture.reshape(4, 6, 4, 6, -1).mean(axis=(1, 3)))
 
 
 def test_a_ball_is_what_a_light_of_its_size_is(device: Device) -> None:
@@ -98,6 +60,22 @@ def test_the_floor_has_the_irradiance_of_a_ball(device: Device) -> None:
     right = 0.3**2 / square * way[:, 2] / np.sqrt(square)  # Wholly above the horizon.
     assert found.mean(axis=(0, 1)) == pytest.approx(6 * COLOR * right.mean(), rel=0.005)
     np.testing.assert_allclose(blocks(found[..., 0]), 6 * blocks(right.reshape(24, 24)), rtol=0.01)
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_a_plane_fills_half_of_what_is_around(device: Device, side: int) -> None:
+    """A matt ball over it, or under it, has L (1 - cosine to the side away from it) / 2."""
+    plane = {"type": "plane", "position": [0, 0, -0.8], "normal": [0, 0, side], "material": "glow"}
+    ball = {"type": "sphere", "radius": 0.4, "material": "white"}
+    scene = lit({"floor": plane, "ball": ball}, 256, camera={"position": [0, -2.2, 0], "fov": 20})
+    framebuffer = shoot(scene, device)
+    found, normals = stacked(framebuffer, ("R", "G", "B")).astype(float), normals_of(framebuffer)
+    # (Not at its rim, which pixels see a part of.)
+    here = (np.abs(np.linalg.norm(points_of(framebuffer), axis=-1) - 0.4) < 1e-3) & (normals[..., 1] < -0.5)
+    assert here.sum() > 200
+    right = 6 * (1 - normals[..., 2]) / 2
+    assert found[here].mean(axis=0) == pytest.approx(COLOR * right[here].mean(), rel=0.005)
+    np.testing.assert_allclose(found[here][:, 0], right[here], atol=0.25)
 
 
 # Large lamps of all kinds, one half hidden by another, near a gloss and a metal; and a dull one that is lit by others.
@@ -134,10 +112,10 @@ def among_many(glow: dict[str, Any], samples: int, bounces: int = 3) -> Scene:
 @pytest.mark.combination
 def test_asking_and_chance_agree(device: Device) -> None:
     # After the last bounce lamps are still asked for, and nothing is met any more.
-    asked, chance = (
-        colors(among_many(GLOW, 256), device),
-        colors(among_many(BY_CHANCE, 2048, bounces=4), device),
-    )
+    asked, sought = (colors(among_many(glow, 256), device) for glow in (GLOW, BY_CHANCE))
+    with chance_alone():
+        chance = colors(among_many(BY_CHANCE, 2048, bounces=4), device)
+    np.testing.assert_allclose(blocks(asked), blocks(sought), rtol=0.02, atol=0.002)
     assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.005)
     one, other = (blocks(each) for each in (asked, chance))
     np.testing.assert_allclose(one, other, rtol=0.04, atol=0.004)
@@ -166,9 +144,12 @@ def test_a_small_lamp_is_little_noise(device: Device) -> None:
         )
         return float(pictures.mean()), float(pictures.var(axis=0, ddof=1).mean())
 
-    asked, chance = spread(GLOW, 0), spread(BY_CHANCE, 1)
+    asked, sought = spread(GLOW, 0), spread(BY_CHANCE, 0)
+    with chance_alone():
+        chance = spread(BY_CHANCE, 1)
     assert asked[0] == pytest.approx(chance[0], rel=0.1)
-    assert asked[1] < chance[1] / 1000
+    assert asked[0] == pytest.approx(sought[0], rel=0.001)
+    assert max(asked[1], sought[1]) < chance[1] / 1000
 
 
 @pytest.mark.parametrize("name", one_of("drum", "ball", "egg", "box"))
@@ -229,8 +210,16 @@ def test_what_is_asked_for() -> None:
     }
     scene = lit(objects, 1, materials=materials)
     found = dict(zip(scene.objects, sampled_radiance(scene), strict=True))
-    assert {name for name, radiance in found.items() if radiance is not None} == {"glow", "box", "cylinder"}
+    assert {name for name, radiance in found.items() if radiance is not None} == {
+        "glow",
+        "box",
+        "cylinder",
+        "plane",
+    }
     assert found["glow"] == (6.0, 3.0, 1.5)
+    # Of what is joined to the set nobody knows the shape.
+    names = list(scene.objects)
+    assert {names[each.thing - 1] for each in emitters_of(scene) if each.sought} == {"map", "blend", "part"}
     direct = lit({"it": lamp("ball")}, 1, lighting={"mode": "direct"})
     assert sampled_radiance(direct) == [None, None]
     # Objects without a material have the scene's.
@@ -243,11 +232,12 @@ def test_a_limit_holds_for_what_shines(device: Device) -> None:
     path = {"mode": "path", "bounces": 1}
     for glow in (GLOW, BY_CHANCE):
         materials = {**MATERIALS, "glow": glow}
-        scenes = [
-            lit({"it": lamp("panel")}, 16, materials=materials, lighting={**path, "clamp": clamp})
-            for clamp in (None, 0.05)
-        ]
-        free, limited = (colors(each, device) for each in scenes)
+        with chance_alone():
+            scenes = [
+                lit({"it": lamp("panel")}, 16, materials=materials, lighting={**path, "clamp": clamp})
+                for clamp in (None, 0.05)
+            ]
+            free, limited = (colors(each, device) for each in scenes)
         assert free.mean() > 0.5
         # The first spot's own question is not limited: nobody has bounced yet.
         if glow is BY_CHANCE:
@@ -294,7 +284,9 @@ def test_lamps_in_glass_and_under_water(device: Device) -> None:
         materials = {**MATERIALS, "clear": clear, "glow": glow}
         return colors(lit(objects, samples, bounces, camera, materials=materials), device)
 
-    asked, chance = picture(GLOW, 256, 7), picture(BY_CHANCE, 1024, 8)
-    assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
-    one, other = (blocks(each) for each in (asked, chance))
-    np.testing.assert_allclose(one, other, rtol=0.08, atol=0.01)
+    with chance_alone():
+        chance = picture(BY_CHANCE, 1024, 8)
+    for asked in (picture(GLOW, 256, 7), picture(BY_CHANCE, 256, 7)):
+        assert asked.mean(axis=(0, 1)) == pytest.approx(chance.mean(axis=(0, 1)), rel=0.01)
+        one, other = (blocks(each) for each in (asked, chance))
+        np.testing.assert_allclose(one, other, rtol=0.08, atol=0.01)

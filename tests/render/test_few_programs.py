@@ -56,10 +56,12 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "stack": ({"cut_planes": [{"plane": PLANE, "count": 9, "spacing": 0.1}]}, {"planes"}),
 }
 GLASS: dict[str, Any] = {"transmission": {"weight": 1, "dispersion_scale": 1}}
+CLEAR: dict[str, Any] = {"specular": {"roughness": 0}, "transmission": {"weight": 1}}
 MILK: dict[str, Any] = {"transmission": {"weight": 1, "depth": 1, "scatter": [1, 1, 1]}}
 SKIN: dict[str, Any] = {"subsurface": {"weight": 1}}
 PATHS = {"lighting": {"mode": "path"}}
 RISES = {"curve": [[0, 0.1], [1, 0.4]]}
+LAMP = {"lights": LAMPS[:1]}
 GLOW = {"glow": {"emission": {"luminance": 3}}}
 # The same of scenes along paths. (Where materials have costly parts, paths are scattered by a stage that knows of them.)
 FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
@@ -67,6 +69,7 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     "lights on the set": (FEATURES["lights on the set"][0], set()),
     "map": (FEATURES["map"][0], set()),
     "shining object": ({"objects": {"ball": {**BALL, "material": "glow"}}, "materials": GLOW}, {"objects"}),
+    "sought light": ({"material": {"name": "glow"}, "materials": GLOW}, {"sought"}),
     "map of a material": (
         {
             "material": {"name": "m"},
@@ -83,7 +86,7 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
             "material": {"name": "m"},
             "materials": {"m": {"blend": ["glow", "n"], "mask": 0.5}, "n": {}, **GLOW},
         },
-        {"materials"},
+        {"materials", "sought"},
     ),
     "tangent": (
         {"materials": {"m": {"specular": {"anisotropy": 0.8}}}, "material": {"name": "m"}},
@@ -106,6 +109,14 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
             "material": {"name": "m"},
         },
         {"glass"},
+    ),
+    "light through a ball": (
+        {"objects": {"ball": {**BALL, "material": "m"}}, "materials": {"m": CLEAR}, **LAMP},
+        {"objects", "bent"},
+    ),
+    "light through a block": (
+        {"objects": {"block": {"type": "box", "material": "m"}}, "materials": {"m": CLEAR}, **LAMP},
+        {"objects", "bent_shapes"},
     ),
     # Rays within objects of glass are ordinary rays.
     "object of glass": (

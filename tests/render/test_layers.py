@@ -298,6 +298,35 @@ def lens(radius: float, other: float, apart: float) -> float:
     return radius**2 * one + other**2 * two - root / 2
 
 
+def test_the_face_of_a_cut_has_the_material_of_its_plane() -> None:
+    """A disc where it opens the ball, and a rectangle where it opens a box; other planes leave the thing's material."""
+    plane = {"plane": {"center": [0, -0.6, 0], "normal": [0, -1, 0]}, "cut": True, "objects": ["slab"]}
+    unseen = {"plane": {"center": [0, 0.9, 0], "normal": [0, 1, 0]}, "cut": True, "material": "red"}
+    slab = {"type": "box", "position": [1.2, -0.5, 0], "size": [0.2, 0.4, 0.5], "material": "red"}
+    sections = {**SECTIONS, "objects": {"slab": slab}, "lighting": path(1)}
+    found = {}
+    for material in ("blue", None):
+        scene = scene_of(**{**sections, "cut_planes": [unseen, {**plane, "material": material}]})
+        film = clfractal.render(scene, channels=["A", *ID_CHANNELS])
+        pixel = (HEIGHT / PIXELS) ** 2
+        found[material] = [
+            coverage(film, layer, name).sum() * pixel
+            for layer, name in [
+                ("CryptoObject", "set"),
+                ("CryptoObject", "slab"),
+                ("CryptoMaterial", "blue"),
+                ("CryptoMaterial", "red"),
+                ("CryptoMaterial", "material"),
+            ]
+        ]
+        middle = PIXELS // 2
+        assert film["object"][middle, middle] == 1
+        assert film["material"][middle, middle] == (2 if material else 3)
+    disc, box = math.pi * 0.64, 0.2 * 0.5
+    assert found["blue"] == pytest.approx([math.pi, box, disc + box, 0, math.pi - disc], rel=0.01, abs=0.004)
+    assert found[None] == pytest.approx([math.pi, box, 0, box, math.pi], rel=0.01, abs=0.004)
+
+
 @pytest.mark.parametrize("lighting", [{}, path(1)])
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
 def test_areas_of_things(lighting: dict[str, Any], precision: str) -> None:

@@ -152,3 +152,6 @@ def test_ignored_keys_are_told() -> None:
     assert "lighting.mode path does not use material.reflection" in film.remarks
     film = clfractal.render(scene_of(materials={"m": {}}, material={"name": "m"}, lights=[{}]))
     assert "material.name m is for lighting.mode path; Phong's keys are shown" in film.remarks
+    faces = [{"cut": True, "material": "m"}]
+    film = clfractal.render(scene_of(materials={"m": {}}, lights=[{}], cut_planes=faces))
+    assert "cut_planes.0.material m is for lighting.mode path; Phong's keys are shown" in film.remarks

@@ -14,6 +14,7 @@ from clfractal.device.select import Device
 from clfractal.integrators.volume import brick_bounds
 from clfractal.scene.grid_place import GridPlace
 from clfractal.scene.model import Scene
+from clfractal.shading.light_tree import lamps_of
 from clfractal.voxels.blocks import brick_ranges
 from clfractal.voxels.dense import grid_from_dense
 from tests.environment_maps import write_map
@@ -181,6 +182,42 @@ def test_light_scattered_once(device: Device, folder: Path, light: str, g: float
         assert found[..., channel].mean() == pytest.approx(expected.mean() * COLOR[channel], rel=0.015)
     error = np.abs(found / COLOR - expected[..., None]).max()
     assert error < 5 * 2.0 * expected.max() / np.sqrt(256)
+
+
+def test_many_lamps_in_a_tree_are_their_sum(device: Device, folder: Path) -> None:
+    """Lamps that are chosen on the way down a tree, of which rays meet some: each beside quadrature, as above."""
+    random = np.random.default_rng(5)
+    ways = random.normal(size=(40, 3))
+    places = ways / np.linalg.norm(ways, axis=1)[:, None] * random.uniform(2.2, 5, 40)[:, None]
+    strengths, radii = random.uniform(0.5, 3, 40), random.uniform(0.05, 0.3, 40)
+    lights: list[dict[str, Any]] = []
+    for number, (place, strength, radius) in enumerate(zip(places, strengths, radii, strict=True)):
+        point = {"type": "point", "falloff": "inverse_square", "intensity": float(strength)}
+        ball = {"type": "sphere", "radius": float(radius), "visible": False}
+        ball["intensity"] = float(strength / radius**2)  # as bright from afar
+        lights.append({**(ball if number % 2 else point), "position": place.tolist()})
+    scene = medium(folder, lights=lights, anisotropy=0.5, samples=512)
+    assert len(lamps_of(scene).nodes) == 2 * len(lights) - 1
+    origin, direction, near, far = within(scene)
+    expected = np.zeros(near.shape)
+    for part in (np.arange(100) + 0.5) / 100:
+        way = part * (far - near)
+        points = origin + (near + way)[..., None] * direction
+        for place, strength in zip(places, strengths, strict=True):
+            offset = place - points
+            square = (offset**2).sum(-1)
+            toward = offset / np.sqrt(square)[..., None]
+            left = np.maximum(to_box(points, toward, CORNER, SIDES)[1], 0)
+            comes = np.pi * strength / square * SIGMA * np.exp(-SIGMA * (way + left))
+            scattered = phase((toward * direction).sum(-1), 0.5) * comes
+            expected += np.where(far > near, scattered, 0) * (far - near) / 100
+    found = light_of(scene, device)
+    for channel in range(3):
+        assert found[..., channel].mean() == pytest.approx(expected.mean() * COLOR[channel], rel=0.01)
+    ours, exact = (
+        each.reshape(4, 6, 4, 6).mean(axis=(1, 3)) for each in (found[..., 0], COLOR[0] * expected)
+    )
+    np.testing.assert_allclose(ours, exact, rtol=0.06, atol=0.02 * expected.max())
 
 
 def followed(scene: Scene, g: float, orders: int, count: int) -> float:

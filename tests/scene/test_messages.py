@@ -181,7 +181,20 @@ camera: {up: §1, fov: 400, fow: 1} => camera.up: must be a list of 3 numbers, g
 """,
         COLOR=COLOR,
     ),
-    ("lights: §[" + "{}, " * 65 + "]", "lights: must have at most 64 entries, got 65"),
+    ("lights: §[" + "{}, " * 4097 + "]", "lights: must have at most 4096 entries, got 4097"),
+    (
+        "lights: §[" + "{}, " * 65 + "]",
+        "lights: must have at most 64 entries with lighting.mode direct, where every place asks all of them, got 65;"
+        " use lighting: {mode: path}",
+    ),
+    (
+        "lighting: {mode: path}\nlights: §[" + "{}, " * 65 + "]",
+        "lights: must have at most 64 entries without a position, all of which are asked everywhere, got 65",
+    ),
+    (
+        "lighting: {mode: path}\nlights: §[" + "{type: set, trap: {}}, " * 65 + "]",
+        "lights: must have at most 64 entries of type set, each of which has many balls, got 65",
+    ),
 ]
 
 

@@ -23,6 +23,7 @@ STEEL = "materials: {steel: {}, clay: {}}\n"
 MANY = ", ".join(f"b{n}: {{}}" for n in range(MAX_OBJECTS + 1))
 
 OTHER = "type: formula, formula: {name: menger_sponge}"
+CUTS = ", ".join(["{cut: true, set: false, objects: [b]}"] * 31)
 FULL = ", ".join(f"f{n}: {{{OTHER}}}" for n in range(MAX_FORMULAS))
 
 # In the texts below the sign § stands where the message must point to.
@@ -68,19 +69,21 @@ objects: {sea: {type: water}}
 cut_planes: [{cut: true, objects: [§sea]}]
 => cut_planes.0.objects.0: 'sea' cannot be cut: a water surface has no end; a flat box can
 objects: {b: {«OTHER»}}
+cut_planes: [{cut: true, set: false, objects: [b], count: 2}, «CUTS», {cut: true, set: false, objects: [§b]}]
+=> cut_planes.32.objects.0: at most 32 cuts of the set's parts, and this is one more
+objects: {b: {type: plane, join: cut}}
 cut_planes: [{cut: true, set: false, objects: [§b]}]
-=> cut_planes.0.objects.0: 'b' is a part of the set, which is cut as a whole; set: true cuts it
+=> cut_planes.0.objects.0: 'b' cannot be cut: a plane surface has no end; a flat box can
 renderer: {type: volume}
 cut_planes: [{}, {cut: true, set: §false}]
 => cut_planes.1.set: is for surface renderers: in a volume all that there is belongs to the set; remove it
 materials: {ice: {transmission: {weight: 1}}}
 lighting: {mode: path}
-material: {name: ice}
-cut_planes: [{cut: true, set: false}, {cut: §true}] => cut_planes.1.cut: cannot open a set of glass, 'ice', along paths
-materials: {ice: {transmission: {weight: 1}}}
+cut_planes: [{cut: true}, {cut: true, material: §ice}]
+=> cut_planes.1.material: 'ice' is glass, and a face is that only where what is cut is; name another material, or none
+materials: {ice: {}}
 lighting: {mode: path}
-objects: {a: {}, b: {material: ice}}
-cut_planes: [{cut: true, objects: [a, §b]}] => cut_planes.0.objects.1: 'b' is of glass, which cannot be cut along paths
+cut_planes: [{cut: true, material: §icy}] => cut_planes.0.material: unknown material 'icy'; did you mean 'ice'?
 cut_planes: [{set: §1}] => cut_planes.0.set: must be true or false, got 1
 renderer: {type: volume}
 objects: {sea: {type: §water}}
@@ -102,6 +105,7 @@ animation: {frames: 9, tracks: {objects.b.formula.parameters.powr: §{expression
         FULL=FULL,
         MAX_FORMULAS=MAX_FORMULAS,
         OTHER=OTHER,
+        CUTS=CUTS,
         STEEL=STEEL,
     ),
     (

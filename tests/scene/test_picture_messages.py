@@ -94,12 +94,20 @@ materials: {m: {subsurface: {radius_scale: [1, 2, 1]}}}
 => materials.m.subsurface.radius_scale.1: must be at most 1, got 2
 lighting: {mode: path}
 materials: {glass: {transmission: {weight: 1}}}
-objects: {bulb: {type: formula, formula: {name: hast}, material: glass}}
-=> objects.bulb.material: 'glass' is glass, which formulas and what is joined can be only with all of the set
+objects:
+  bulb: {type: formula, formula: {name: hast}, material: glass}
+  ball: {type: sphere, join: §smooth_union}
+=> objects.ball.join: cannot be smooth_union where some formulas are of glass and others not: name one material for all
+lighting: {mode: path}
+materials: {glass: {transmission: {weight: 1}}, clay: {}}
+objects:
+  bulb: {type: formula, formula: {name: hast}, material: glass}
+  ball: {type: sphere, join: cut, material: §clay}
+=> objects.ball.material: is that of what is cut where some formulas are of glass and others not; remove it
 lighting: {mode: path}
 materials: {glass: {transmission: {weight: 1}}}
 objects: {ball: {type: sphere, join: cut, material: glass}}
-=> objects.ball.material: 'glass' is glass, which formulas and what is joined can be only with all of the set
+=> objects.ball.material: 'glass' is glass, which what is joined by cut can be only with all of the set
 renderer: {type: volume, transfer: {«STOPS»}}
 lighting: {mode: path}
 fog: {density: 0.1}

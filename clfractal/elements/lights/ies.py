@@ -73,6 +73,12 @@ class IesLight(SmallLight):
         values = [value / 1000 for angle in horizontal for value in rows[angle]]
         return [len(vertical), len(horizontal), *vertical, *horizontal, *values]
 
+    @classmethod
+    def most_of(cls, table: Sequence[float]) -> float:
+        """As of every light."""
+        angles = int(table[0]) + int(table[1])
+        return float(max(table[2 + angles :]))
+
     def packed(self) -> dict[str, object]:
         """As of every light."""
         axis = unit(self.direction)

@@ -25,6 +25,11 @@ class PointLight(SmallLight):
         """As of every light."""
         return 1.0 if self.falloff == "none" else 1 / away**2
 
+    @property
+    def weakens(self) -> bool:
+        """As of every light."""
+        return self.falloff != "none"
+
     def packed(self) -> dict[str, object]:
         """As of every light."""
         return {**super().packed(), "inverse_square": int(self.falloff == "inverse_square")}

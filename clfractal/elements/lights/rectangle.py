@@ -51,6 +51,20 @@ class RectangleLight(SingleLight):
         side = unit(cross(self.direction, self.up))
         return side, unit(cross(side, self.direction))
 
+    @property
+    def extent(self) -> Vector:
+        """As of every light."""
+        side, upward = self.frame
+        x, y, z = (
+            abs(a) * self.width / 2 + abs(b) * self.height / 2 for a, b in zip(side, upward, strict=True)
+        )
+        return x, y, z
+
+    @property
+    def beam(self) -> tuple[Vector, float, float]:
+        """As of every light."""
+        return self.direction, 0.0, pi / 2
+
     def packed(self) -> dict[str, object]:
         """As of every light."""
         side, upward = self.frame

@@ -4,7 +4,7 @@ from typing import Any, Literal
 
 from pydantic import Field
 
-from clfractal.schema.base import Length, Position
+from clfractal.schema.base import Length, Position, Vector
 from clfractal.schema.light import SingleLight
 from clfractal.schema.record import Number
 
@@ -30,6 +30,11 @@ class SphereLight(SingleLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return min(self.radius / away, 1.0) ** 2
+
+    @property
+    def extent(self) -> Vector:
+        """As of every light."""
+        return (self.radius,) * 3
 
     def packed(self) -> dict[str, object]:
         """As of every light."""

@@ -1,11 +1,11 @@
 """A light at a point that shines into a cone."""
 
-from math import radians
+from math import pi, radians
 from typing import Any, Literal
 
 from pydantic import Field
 
-from clfractal.schema.base import Direction, Fraction, Position, unit
+from clfractal.schema.base import Direction, Fraction, Position, Vector, unit
 from clfractal.schema.light import AXIS, SmallLight
 from clfractal.schema.record import Number
 
@@ -42,6 +42,16 @@ class SpotLight(SmallLight):
     def given(self, away: float) -> float:
         """As of every light."""
         return 1.0 if self.falloff == "none" else 1 / away**2
+
+    @property
+    def weakens(self) -> bool:
+        """As of every light."""
+        return self.falloff != "none"
+
+    @property
+    def beam(self) -> tuple[Vector, float, float]:
+        """As of every light; a little more, for what is rounded."""
+        return self.direction, min(radians(self.angle) / 2 + 1e-3, pi), 1e-2
 
     def packed(self) -> dict[str, object]:
         """As of every light."""

@@ -17,6 +17,7 @@ class ConeObject(Solid):
     """A cone with a tip, or with lids at both ends; its axis is z before it is rotated."""
 
     place = 55
+    rounded = 2
     type: Literal["cone"] = "cone"
     radius: Annotated[Length, SCALE] = Field(0.4, description="of its lower lid, scene units")
     top: Amount = Field(0.0, description="radius of its upper lid, scene units; 0: a tip")

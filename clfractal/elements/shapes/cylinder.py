@@ -16,6 +16,7 @@ class CylinderObject(Solid):
     """A cylinder with lids; its axis is z before it is rotated."""
 
     place = 50
+    rounded = 2
     type: Literal["cylinder"] = "cylinder"
     radius: Annotated[Length, SCALE] = Field(0.25, description="scene units")
     height: Annotated[Length, SCALE] = Field(1.0, description="from lid to lid, scene units")

@@ -16,6 +16,7 @@ class SphereObject(Solid):
     """A ball, or with `scale` an ellipsoid."""
 
     place = 30
+    rounded = 3
     type: Literal["sphere"] = "sphere"
     radius: Annotated[Length, SCALE] = Field(0.5, description="scene units")
 

@@ -17,6 +17,7 @@ class TorusObject(Solid):
     """A torus, as a ring or a tyre; it lies around the z axis before it is rotated."""
 
     place = 60
+    rounded = 2
     spans = 2
     type: Literal["torus"] = "torus"
     radius: Annotated[Length, SCALE] = Field(

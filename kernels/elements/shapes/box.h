@@ -10,6 +10,8 @@ INLINE vec box_normal(vec form, vec own) {
     return vec_of(pick(by_x, own.x, R(0.0)), pick(by_y, own.y, R(0.0)), pick(by_x | by_y, R(0.0), own.z));
 }
 
+INLINE vec box_bends(vec form, vec own, vec way) { return vec_of(R(0.0), R(0.0), R(0.0)); }
+
 INLINE vec box_on(vec form, vec own) {
     const real x = fabs(own.x), y = fabs(own.y), z = fabs(own.z), largest = fmax(fmax(x, y), z);
     return vec_of(pick(less(x, largest), own.x, copysign(R(1.0), own.x)), pick(less(y, largest), own.y, copysign(R(1.0), own.y)),

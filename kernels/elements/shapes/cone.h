@@ -34,6 +34,12 @@ INLINE vec cone_normal(vec form, vec own) {
     return vec_of(pick(lid, R(0.0), own.x), pick(lid, R(0.0), own.y), pick(lid, own.z, R(0.5) * (form.x - form.y) * arm));
 }
 
+INLINE vec cone_bends(vec form, vec own, vec way) {
+    const real arm = sqrt(own.x * own.x + own.y * own.y), out = (own.x * way.x + own.y * way.y) / fmax(arm, R(1e-30));
+    const mask lid = cone_lid(form, own, arm);
+    return vec_of(pick(lid, R(0.0), way.x), pick(lid, R(0.0), way.y), pick(lid, R(0.0), R(0.5) * (form.x - form.y) * out));
+}
+
 INLINE vec cone_on(vec form, vec own) {
     const real arm = sqrt(own.x * own.x + own.y * own.y);
     const mask lid = cone_lid(form, own, arm);

@@ -15,6 +15,11 @@ INLINE vec cylinder_normal(vec form, vec own) {
     return vec_of(pick(lid, R(0.0), own.x), pick(lid, R(0.0), own.y), pick(lid, own.z, R(0.0)));
 }
 
+INLINE vec cylinder_bends(vec form, vec own, vec way) {
+    const mask lid = less(own.x * own.x + own.y * own.y, own.z * own.z);
+    return vec_of(pick(lid, R(0.0), way.x), pick(lid, R(0.0), way.y), R(0.0));
+}
+
 INLINE vec cylinder_on(vec form, vec own) {
     const real square = own.x * own.x + own.y * own.y;
     const mask lid = less(square, own.z * own.z);

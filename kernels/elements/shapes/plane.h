@@ -7,6 +7,7 @@ INLINE span plane_span(vec form, int number, vec from, vec way) {
 }
 
 INLINE vec plane_normal(vec form, vec own) { return vec_of(R(0.0), R(0.0), R(1.0)); }
+INLINE vec plane_bends(vec form, vec own, vec way) { return vec_of(R(0.0), R(0.0), R(0.0)); }
 INLINE vec plane_on(vec form, vec own) { return vec_of(own.x, own.y, R(0.0)); }
 INLINE mask plane_holds(vec form, vec own) { return less(own.z, R(0.0)); }
 

@@ -4,6 +4,8 @@ INLINE span sphere_span(vec form, int number, vec from, vec way) { return span_o
 
 INLINE vec sphere_normal(vec form, vec own) { return own; }
 
+INLINE vec sphere_bends(vec form, vec own, vec way) { return way; }
+
 INLINE vec sphere_on(vec form, vec own) {
     const real square = own.x * own.x + own.y * own.y;
     return vec_scale(own, R(1.0) / fmax(sqrt(square + own.z * own.z), R(1e-30)));

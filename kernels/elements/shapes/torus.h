@@ -70,6 +70,14 @@ INLINE span torus_span(vec form, int number, vec from, vec way) {
 
 INLINE vec torus_normal(vec form, vec own) { return torus_even(form, torus_offset(form, torus_even(form, own))); }
 
+// Where the tube is, the circle goes on with the way, and turns.
+INLINE vec torus_bends(vec form, vec own, vec way) {
+    const vec even = torus_even(form, own), along = torus_even(form, way);
+    const real share = R(1.0) / fmax(sqrt(even.x * even.x + even.y * even.y), R(1e-30)), ring = form.x * share;
+    const real out = ring * share * share * (even.x * along.x + even.y * along.y);
+    return torus_even(form, vec_of((R(1.0) - ring) * along.x + out * even.x, (R(1.0) - ring) * along.y + out * even.y, along.z));
+}
+
 INLINE vec torus_on(vec form, vec own) {
     const vec even = torus_even(form, own), off = torus_offset(form, even);
     const vec on = vec_along(even, form.y / fmax(sqrt(vec_dot(off, off)), R(1e-30)) - R(1.0), off);

@@ -51,11 +51,6 @@ INLINE sight march_place(const march *m) {
     return s;
 }
 
-// The scaled distance at which light is computed, in cones.
-INLINE real near_of(clearance here, march_record settings) {
-    return JOINED ? (real)(settings->near) * here.scale / (real)(settings->step_scale) : (real)(settings->near);
-}
-
 // The step in a hollow: nothing counts as near there, but for what is joined to it.
 INLINE void march_blind(const march *m, sight *s, march_record settings) {
     const real step = (real)(settings->step), first = most(BLIND_FIRST * s->cone, BLIND_LEAST * step);

@@ -31,9 +31,16 @@ INLINE crossing crossing_pick(mask m, crossing yes, crossing no) {
 #define MARCH_TESTS(m, point, here)                                                                 \
     const vec point = vec_along((m)->r.origin, (m)->t, (m)->r.direction);                           \
     const orbit_end here = orbit_solid(point, (m)->active, orbit->iterations, orbit, k);            \
+    MARCH_COUNTS(m, here)
+#define MARCH_COUNTS(m, here)                                                                       \
     if (settings->counts_waits) (m)->waits += orbit_waits((m)->active, here.count);                 \
     (m)->found.steps += pick((m)->active, R(1.0), R(0.0));                                          \
     (m)->found.count += pick((m)->active, here.count, R(0.0))
+
+// The scaled distance at which light is computed, in cones.
+INLINE real near_of(clearance here, march_record settings) {
+    return JOINED ? (real)(settings->near) * here.scale / (real)(settings->step_scale) : (real)(settings->near);
+}
 
 // The goal of a march (see march.h and march_steps.h).
 enum { GOAL_SURFACE, GOAL_SHADOW, GOAL_TOUCH, GOAL_POINT, GOAL_CONE, GOAL_WALK };

@@ -27,9 +27,9 @@ INLINE real in_grid(ray r, real face, __constant const struct Grid *about) {
 }
 
 INLINE mask face_met(ray *r, mask *active, plane_face *face, world w) {
-    real from;
+    real from, body;
     *active &= planes_cut(r, &from, w.planes);
-    const mask bare = planes_face(*r, in_grid(*r, from, w.grid.about), *active, w.planes, &face->tint, &face->normal, &face->count);
+    const mask bare = planes_face(*r, in_grid(*r, from, w.grid.about), *active, w.planes, &face->tint, &face->normal, &face->count, &body);
     *active &= ~bare;
     return bare;
 }

@@ -57,7 +57,7 @@ INLINE void volume_path_scatters(volume_path *p, const packet_pixels *at, int sa
     const onward next = medium_sample(&e, u, v);
     p->density = next.density;
     p->direction = vec_pick(here, next.direction, p->direction);
-    p->on_path = path_stays(&p->through, roulette, bounce, w.settings->roulette, p->on_path);
+    p->on_path = path_stays(&p->through, roulette, (real)((scalar)bounce), w.settings->roulette, p->on_path);
 }
 
 // The first thing that a path from the eye meets.

@@ -44,3 +44,5 @@ INLINE mask rectangle_light_met(light_record light, vec origin, vec direction, r
     return front & less_equal(fabs(vec_dot(place, side)), vec_dot(side, side)) &
            less_equal(fabs(vec_dot(place, upward)), vec_dot(upward, upward));
 }
+
+INLINE vec rectangle_light_normal(light_record light, vec place) { return vec_splat(light->axis); }

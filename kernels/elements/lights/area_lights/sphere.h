@@ -28,3 +28,5 @@ INLINE mask sphere_light_met(light_record light, vec origin, vec direction, real
     *distance = along - sqrt(most(inside, R(0.0)));
     return less_equal(R(0.0), inside) & less(R(0.0), *distance);
 }
+
+INLINE vec sphere_light_normal(light_record light, vec place) { return vec_sub(place, vec_splat(light->vector)); }

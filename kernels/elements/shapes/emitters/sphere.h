@@ -9,6 +9,12 @@ INLINE real ball_density(vec sides, real square, vec direction) {
     return R(0.15915494309189535) / (spread * (sides.x * stretch) * (sides.y * stretch) * (sides.z * stretch));
 }
 
+// Whether a direction meets a ball whose own units these are; grazing ones do.
+INLINE mask meets_ball(vec from, vec own) {
+    const vec beside = vec_cross(from, own);
+    return less(vec_dot(from, own), R(0.0)) & less_equal(vec_dot(beside, beside), R(1.0001) * vec_dot(own, own));
+}
+
 INLINE emitter_place sphere_place(vec form, vec sides, vec point, real choice, real u, real v, const vec *met) {
     const vec from = vec_over(point, sides);
     const real square = fmax(vec_dot(from, from), R(1.0));
@@ -24,7 +30,8 @@ INLINE emitter_place sphere_place(vec form, vec sides, vec point, real choice, r
         const real distance = middle - sqrt(fmax(R(1.0) - vec_dot(nearest, nearest), R(0.0)));
         way = vec_mul(vec_scale(own, distance), sides);
     }
-    return (emitter_place){way, ball_density(sides, square, vec_normalize(way))};
+    const vec toward = vec_normalize(way);
+    return (emitter_place){way, pick(meets_ball(from, vec_over(toward, sides)), ball_density(sides, square, toward), R(0.0))};
 }
 
 INLINE real sphere_weight(vec form, vec sides, vec point, real bright) {

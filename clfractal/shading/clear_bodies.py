@@ -1,0 +1,61 @@
+"""Clear bodies with smooth boundaries, through which lights are sampled (`bent_light.h`)."""
+
+from __future__ import annotations
+
+from clfractal.elements.shapes.plane import PlaneObject
+from clfractal.elements.shapes.sphere import SphereObject
+from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.materials import PbrMaterial
+from clfractal.scene.model import Scene
+from clfractal.scene.objects import WaterObject
+from clfractal.schema.mapped import Map
+from clfractal.schema.material import BLACK
+from clfractal.schema.shape import ObjectBase, Solid
+from clfractal.shading.maps import MappedMaterials
+from clfractal.shading.materials import used_materials
+
+
+def is_clear(material: PbrMaterial) -> bool:
+    """Whether light goes through a material as through a polished pane: at one angle, the same at all places and of
+    all colours, and without being scattered.
+    """
+    if material.blend is not None:
+        return False
+    layers = (material.transmission, material.specular, material.coat, material.fuzz, material.thin_film)
+    if any(isinstance(getattr(part, key), Map) for part in layers for key in type(part).model_fields):
+        return False
+    glass = material.transmission
+    bare = material.coat.weight == 0 and material.fuzz.weight == 0 and material.thin_film.weight == 0
+    smooth = (
+        material.specular.roughness == 0 and material.subsurface.weight == 0 and material.base.metalness == 0
+    )
+    clear: bool = glass.weight > 0 and glass.scatter == BLACK and glass.dispersion_scale == 0
+    return clear and bare and smooth
+
+
+def crossings(body: ObjectBase) -> int:
+    """Over how many boundaries of a body light is sampled: one of a plane or water, two of a solid, none of others."""
+    return 2 if isinstance(body, Solid) else int(isinstance(body, PlaneObject | WaterObject))
+
+
+def is_shot(body: ObjectBase) -> bool:
+    """Whether chains through a body that is crossed twice are found by shooting rays: through all but round balls."""
+    return isinstance(body, Solid) and not (isinstance(body, SphereObject) and len(set(body.scale)) == 1)
+
+
+def clear_bodies(scene: Scene) -> list[int]:
+    """Of each object over how many of its boundaries light is sampled: of clear ones that no plane cuts."""
+    none = [0] * len(scene.objects)
+    if not isinstance(scene.lighting, PathLighting) or MappedMaterials(scene).has_bump:
+        return none
+    cut = {name for plane in scene.cut_planes for name in plane.cut_objects}
+    return [
+        crossings(each) if name not in scene.joined and name not in cut and is_clear(material) else 0
+        for (name, each), material in zip(scene.objects.items(), used_materials(scene)[1:], strict=True)
+    ]
+
+
+def has_shot_bodies(scene: Scene) -> bool:
+    """Whether light is sampled through a body of which `is_shot` is true."""
+    rows = zip(clear_bodies(scene), scene.objects.values(), strict=True)
+    return any(over and is_shot(each) for over, each in rows)

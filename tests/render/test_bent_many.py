@@ -1,0 +1,76 @@
+"""Light of many lamps, which stand in a tree, that clear bodies bend: beside that of one lamp, and chance."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from clfractal.integrators import state, waves
+from clfractal.scene.model import Scene
+from clfractal.shading.emitter_tree import shining_of
+from clfractal.shading.light_tree import lamps_of
+from tests.render.bent_scenes import ALBEDO, INDEX, light_of, pool, transmittance, under_ball
+
+MANY = 20
+PLACES = [
+    [0.9 * np.cos(each), 0.9 * np.sin(each), 1.3 + 0.3 * np.cos(2 * each)]
+    for each in np.arange(MANY) * 2 * np.pi / MANY
+]
+
+
+def test_many_lamps_at_one_place_bring_the_light_of_one_through_water() -> None:
+    """As in `test_bent_light.py`, where one lamp of their strength is over the floor."""
+    lamp = {"type": "point", "position": [0, 0, 0.8], "falloff": "inverse_square", "intensity": 2 / MANY}
+    scene = pool([lamp] * MANY)
+    assert len(lamps_of(scene).nodes) > 0
+    found = light_of(scene, 4)
+    expected = ALBEDO * 2 * transmittance(1.0) / (0.8 + 1 / INDEX) ** 2 / INDEX**2
+    np.testing.assert_allclose(found.max(), expected, rtol=0.01)
+
+
+def under_many(lights: list[dict[str, Any]], bounces: int, **objects: Any) -> Scene:
+    """A ball of glass over a floor, with lamps, and with more objects."""
+    scene = under_ball(lights, [0, -2.5, 1], [0, 0, -0.8], 40, bounces).model_dump(
+        mode="json", exclude_unset=True
+    )
+    scene["objects"] |= objects
+    scene["materials"] |= {
+        "white": {"base": {"color": [ALBEDO] * 3}, "specular": {"weight": 0}},
+        "shines": {"base": {"weight": 0}, "specular": {"weight": 0}, "emission": {"luminance": 1}},
+    }
+    return Scene.model_validate(scene)
+
+
+BALLS = {
+    f"lamp {number}": {
+        "type": "sphere",
+        "radius": 0.1,
+        "position": [float(x) for x in place],
+        "material": "shines",
+    }
+    for number, place in enumerate(PLACES)
+}
+LAMPS = [
+    {"type": "sphere", "radius": 0.1, "position": [float(x) for x in place], "intensity": 0.2 + 0.05 * number}
+    for number, place in enumerate(PLACES)
+]
+
+
+@pytest.mark.light
+@pytest.mark.parametrize("many", ["lamps", "objects"])
+def test_no_light_of_many_lamps_is_lost_or_counted_twice(many: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same light as by chance on the whole, and less noise."""
+    scene = under_many(LAMPS, 8) if many == "lamps" else under_many([], 8, **BALLS)
+    assert len(lamps_of(scene).nodes) + len(shining_of(scene).nodes) > 0
+    seeds = range(5)
+    found = np.array([light_of(scene, 64, seed) for seed in seeds])
+    for each in (waves, state):
+        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
+    by_chance = np.array([light_of(scene, 256, seed) for seed in seeds])
+    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
+    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
+    assert abs(one.mean() - other.mean()) < 0.005 * other.mean() + 3 * error
+    # At equal samples.
+    assert found.var(axis=0, ddof=1).mean() / 4 < by_chance.var(axis=0, ddof=1).mean()
