@@ -18,6 +18,7 @@ from clfractal.files.exr import write_exr
 from clfractal.files.inputs import noting, refuse_overwriting
 from clfractal.files.volume_file import Volume, write_volume
 from clfractal.scene.load import load_scene, read_scene
+from tests.exchange.files import settings
 from tests.shell import SCENE, InProcess
 
 VOLUME = SCENE + "renderer: {type: volume, file: scan.nrrd}\n"
@@ -65,6 +66,8 @@ def _files(here: Path) -> None:
     (here / "deep").symlink_to(".")
     (here / "folder").mkdir()
     os.link(here / "sky.exr", here / "hard.exr")
+    # A settings file of Mandelbulber by a scene's name, which is where its scene may go.
+    (here / "hall.yaml").write_text(settings("formula_1 2;"))
 
 
 def contents(here: Path) -> dict[str, bytes]:
@@ -111,6 +114,8 @@ REFUSED = {
     "mesh scan.nrrd -o link.ply": f"link.ply: {READ}, but it is the file 'scan.nrrd'",
     "vary scene.yaml -o folder --sheet folder/scene-01.png": f"folder/scene-01.png: {TWICE}",
     "find scene.yaml -o folder --sheet folder/scene-01.png": f"folder/scene-01.png: {TWICE}",
+    "import hall.yaml -o hall.yaml": f"hall.yaml: {READ}",
+    "import hall.yaml -o deep/hall.yaml": f"deep/hall.yaml: {READ}, but it is the file 'hall.yaml'",
     "view scene.png --shot scene.png": f"scene.png: {READ}",
     "view scene.yaml --record scene.yaml": f"scene.yaml: {READ}",
     "view formula.yaml --save own.yaml": f"own.yaml: {READ}",
@@ -127,7 +132,7 @@ def test_what_is_refused(here: Path, clf: InProcess, line: str) -> None:
 
 
 # Options that take a file which is not written, or a new one in a folder.
-_NOT_WRITTEN = {("view", "--play")}
+_NOT_WRITTEN = {("view", "--play"), ("import", "--formulas")}
 # A command that checks its outputs as `render` does, tells what is wrong, and waits for another scene.
 _WAITS = {("watch", "--output")}
 # Options whose command reads no file.
@@ -142,7 +147,8 @@ def _options() -> Iterator[tuple[str, tuple[str, ...]]]:
             for option in get_args(hint)[1:]:
                 if "Path" in str(get_args(hint)[0]):
                     # Typer keeps an annotation's first name where it keeps defaults.
-                    yield command.callback.__name__, (option.default, *option.param_decls)
+                    # A word of Python's own has an underscore after it.
+                    yield command.callback.__name__.rstrip("_"), (option.default, *option.param_decls)
 
 
 def test_every_option_that_writes_a_file_is_tried_above() -> None:

@@ -33,9 +33,12 @@ KERNELS = (
     *("fill_bricks", "store_bricks", "classify_nodes", "classify_bricks", "seen_blocks"),
 )
 
-# Functions that are too large to be written out, and what they call in turn (PoCL's `__pocl_...`).
+# Functions that are too large to be written out, and what they call in turn (PoCL's `__pocl_...`); and adding to a
+# launch's counts, which a work-item does once, at its end.
 _TRANSCENDENTAL = "exp|exp2|log|log2|pow|sin|cos|tan|asin|acos|atan|atan2|sincos"
-_ALLOWED = re.compile(rf"_Z\d+(_cl_)?({_TRANSCENDENTAL})[DPfd]|_Z\d+__pocl_|_Z\d+get_|mem(cpy|set)")
+_ALLOWED = re.compile(
+    rf"_Z\d+(_cl_)?({_TRANSCENDENTAL})[DPfd]|_Z\d+__pocl_|_Z\d+get_|_Z\d+_cl_atomic_add|mem(cpy|set)"
+)
 
 # Built-in functions that are no more than some instructions.
 _SMALL = re.compile(
