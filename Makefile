@@ -12,6 +12,7 @@
 #   make lowest        render (on a cluster too), animate, voxelize, mesh and view once with the lowest versions of libraries that pyproject.toml allows
 #   make bench         the speed table of this machine
 #   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
+#   make peers         silhouettes and depths beside the installed Mandelbulber 2, for its examples (ARGUMENTS="--sample 20")
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
 #   make gpu-check     what all kernels need on GPUs of NVIDIA and AMD, without one (needs clang-16 and libclc-16)
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
@@ -39,7 +40,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE docs/clfractal.1
 
-.PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth mutate gpu-check portability install clean
+.PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth peers mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -117,6 +118,10 @@ bench: $(VENV)/.installed
 
 truth: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.truth $(ARGUMENTS)
+
+# What was measured is kept in build/peers.json, and not measured again.
+peers: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.peers $(ARGUMENTS)
 
 # Copies of the checkout are changed, so it is the checkout that is tested and not what is installed.
 mutate: $(VENV)/.mutates-with

@@ -1,0 +1,193 @@
+"""What the installed Mandelbulber 2 renders of a settings file: where each pixel's ray met the surface.
+
+Its z-buffer, a PNG, has logarithms between the nearest and the farthest depth of the picture, and does not tell these
+two. Its picture of places in space, a PNG too, has coordinates modulo 1. Together they tell depths exactly.
+"""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from clfractal.exchange.settings import Section
+
+Floats = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+
+PROGRAM = "mandelbulber2"
+FOLDER = Path("/usr/share/mandelbulber2")
+FINER = 20
+"""How much finer their surface is found than they would at this size: theirs is thicker than the set by a pixel."""
+_NOTHING = 65535
+_OFF = (
+    "shadows_enabled",
+    "ambient_occlusion_enabled",
+    "raytraced_reflections",
+    "DOF_enabled",
+    "DOF_monte_carlo",
+    "MC_soft_shadows_enable",
+    "volumetric_fog_enabled",
+    "iteration_fog_enable",
+    "basic_fog_enabled",
+    "glow_enabled",
+    "fake_lights_enabled",
+    "random_lights_group",
+    "stereo_enabled",
+    "antialiasing_enabled",
+    "hdr_blur_enabled",
+    "textured_background",
+    "env_mapping_enable",
+    "slow_shading",
+    "main_light_volumetric_enabled",
+    *(f"aux_light_enabled_{number}" for number in range(1, 5)),
+)
+"""What costs time, and changes nothing of where surfaces are."""
+
+
+class TheirsError(Exception):
+    """It made no picture; the message says why, in one line."""
+
+
+@dataclass(frozen=True, slots=True)
+class Depths:
+    """Their picture's depths.
+
+    Attributes:
+        t: distances along the rays, scene units, shape (height, width); inf where nothing was hit.
+        spread: by how much places and z-buffer disagree, relative, in the middle; nan if depths could not be told.
+    """
+
+    t: Floats
+    spread: float
+
+
+def is_there() -> bool:
+    """Whether the program and its files are installed."""
+    return shutil.which(PROGRAM) is not None and (FOLDER / "formula").is_dir()
+
+
+def examples() -> list[Path]:
+    """All its example settings, in an order that does not change."""
+    return sorted((FOLDER / "examples").rglob("*.fract"))
+
+
+def picture(
+    path: Path, output: Path, size: tuple[int, int], overrides: dict[str, object], seconds: float
+) -> None:
+    """Renders a settings file to PNG files: `output`, and beside it what else the overrides ask for.
+
+    Raises:
+        TheirsError: it made none, or took too long.
+    """
+    with tempfile.TemporaryDirectory(prefix="mandelbulber-") as home:
+        command: list[str | Path] = [PROGRAM, "-n", "-C", "-r", f"{size[0]}x{size[1]}", "-f", "png"]
+        if overrides:
+            command += ["-O", "#".join(f"{key}={value}" for key, value in overrides.items())]
+        # Its own settings must be the defaults, and numbers with points.
+        environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen", "HOME": home, "LC_ALL": "C.UTF-8"}
+        try:
+            subprocess.run(
+                [*command, "-o", output.with_suffix(""), path],
+                env=environment,
+                capture_output=True,
+                timeout=seconds,
+                check=False,
+            )
+        except subprocess.TimeoutExpired:
+            raise TheirsError(f"theirs took more than {seconds:g} s") from None
+    if not output.is_file():
+        raise TheirsError("theirs wrote no picture")
+
+
+def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seconds: float) -> Depths:
+    """Where their rays meet the surface.
+
+    Args:
+        main: the file's settings, for how fine its surface is.
+        rays: directions of length 1 through their pixels, shape (side, side, 3), as they have space.
+        eye: where rays begin, shape (3,).
+
+    Raises:
+        TheirsError: it made no picture, or took too long.
+    """
+    asked: dict[str, object] = dict.fromkeys(_OFF, 0)
+    asked |= {"optional_image_channels_enabled": 1, "zbuffer_enabled": 1, "zbuffer_quality": 1}
+    asked |= {"world_enabled": 1, "world_quality": 1}
+    asked["detail_level"] = FINER * main.number("detail_level", 1.0)
+    asked |= {f"mat{number}_transparency_of_surface": 0 for number in range(1, 10)}
+    with tempfile.TemporaryDirectory(prefix="peers-") as folder:
+        output = Path(folder, "picture.png")
+        picture(path, output, (side, side), asked, seconds)
+        levels = _read(output.with_name("picture_zbuffer.png"))[..., 0]
+        places = (_read(output.with_name("picture_world.png")) + 0.5) / 65535  # they were rounded down
+    farthest = main.number("view_distance_max", 50.0)
+    return decoded(levels, places, rays, eye, 1.01 * farthest + 0.1)
+
+
+def decoded(levels: Floats, places: Floats, rays: Floats, eye: Floats, farthest: float) -> Depths:
+    """Depths from the z-buffer's levels and from places modulo 1, shape (height, width[, 3]); none is beyond `farthest`."""
+    hit = levels != _NOTHING
+    t = np.full(levels.shape, np.inf)
+    if not hit.any():
+        return Depths(t, 0.0)
+    found = np.full(levels.shape, np.nan)
+    for y, x in zip(*np.nonzero(hit), strict=True):
+        found[y, x] = _along(places[y, x], rays[y, x], eye, farthest)
+    sure = np.isfinite(found)
+    if sure.sum() < 3:
+        return Depths(np.where(hit, np.nan, np.inf), np.nan)
+    # The logarithm of depth grows evenly with the level; levels are rounded down.
+    level, log = levels[sure] + 0.5, np.log(found[sure])
+    slope, start = _line(level, log)
+    t[hit] = np.exp(start + slope * (levels[hit] + 0.5))
+    spread = float(np.median(np.abs(np.log(t[sure]) - log)))
+    return Depths(t, spread)
+
+
+def _along(place: Floats, ray: Floats, eye: Floats, farthest: float) -> float:
+    """The only distance at which a ray has these coordinates modulo 1; nan if there is none, or several."""
+    axis = int(np.argmax(np.abs(ray)))
+    wholes = np.arange(int(abs(ray[axis]) * farthest) + 2)
+    first = (place[axis] - eye[axis]) * np.sign(ray[axis]) % 1.0
+    candidates = (first + wholes) / abs(ray[axis])
+    # A depth that is about 0 may come out as one turn more by rounding.
+    off = (eye + candidates[:, None] * ray - place + 0.5) % 1.0 - 0.5
+    near = np.abs(off).max(axis=1) < 3e-5 + 3e-7 * candidates
+    return float(candidates[near][0]) if near.sum() == 1 else float("nan")
+
+
+def _line(x: Floats, y: Floats) -> tuple[float, float]:
+    """Slope and start of the line that most points are on, some of which may be anywhere."""
+    if np.ptp(x) < 1:
+        return 0.0, float(np.median(y))
+    generator = np.random.default_rng(1)
+    best, slope, start = -1, 0.0, float(np.median(y))
+    for _ in range(300):
+        a, b = generator.integers(len(x), size=2)
+        if abs(x[a] - x[b]) < 0.1 * np.ptp(x):
+            continue
+        tried = (y[a] - y[b]) / (x[a] - x[b])
+        off = np.abs(y - y[a] - tried * (x - x[a]))
+        count = int((off < 2e-3).sum())
+        if tried >= 0 and count > best:
+            best, slope, start = count, tried, y[a] - tried * x[a]
+    near = np.abs(y - start - slope * x) < 2e-3
+    if near.sum() >= 3 and np.ptp(x[near]) > 1:
+        slope, start = (float(each) for each in np.polyfit(x[near], y[near], 1))
+    return float(slope), float(start)
+
+
+def _read(path: Path) -> Floats:
+    import png
+
+    if not path.is_file():
+        raise TheirsError("theirs wrote no depths")
+    width, height, rows, _ = png.Reader(filename=str(path)).asDirect()
+    return np.vstack([np.asarray(row) for row in rows]).reshape(height, width, -1).astype(float)
