@@ -95,11 +95,13 @@ class Imported:
         scene: plain data, as `load_scene` takes it.
         remarks: what was not taken over, one line each.
         origins: the files that formulas were made of, one line each.
+        kind: what the file is.
     """
 
     scene: dict[str, Any]
     remarks: tuple[str, ...]
     origins: tuple[str, ...] = ()
+    kind: str = "a settings file of Mandelbulber 2"
 
     def text(self, name: str) -> str:
         """A scene file's text; origins and remarks are comments at its beginning.
@@ -107,7 +109,7 @@ class Imported:
         Args:
             name: of the file that it was made of.
         """
-        lines = [f"{name}, a settings file of Mandelbulber 2.", *self.origins]
+        lines = [f"{name}, {self.kind}.", *self.origins]
         if self.remarks:
             lines += ["What is not taken over:", *self.remarks]
         # A file may have any characters; a comment has only what YAML allows in one.

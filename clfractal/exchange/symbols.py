@@ -27,7 +27,7 @@ class Symbol:
 
 Value = float | Symbol
 
-_FUNCTIONS: Mapping[str, Callable[..., float]] = {
+FUNCTIONS: Mapping[str, Callable[..., float]] = {
     "abs": abs,
     "sign": lambda x: float((x > 0) - (x < 0)),
     "sqrt": lambda x: math.sqrt(max(x, 0.0)),
@@ -93,8 +93,8 @@ class Symbols:
             TooLargeError: there are too many of them.
             ArithmeticError, ValueError: of numbers that have no such value.
         """
-        if all(isinstance(part, float) for part in parts) and operation in _FUNCTIONS:
-            return float(_FUNCTIONS[operation](*parts))
+        if all(isinstance(part, float) for part in parts) and operation in FUNCTIONS:
+            return float(FUNCTIONS[operation](*parts))
         simple = self._simple(operation, parts)
         return self._made(operation, parts) if simple is None else simple
 
@@ -183,22 +183,26 @@ class Symbols:
 def names_in(values: Sequence[Value]) -> set[str]:
     """The variables that values depend on."""
     found: set[str] = set()
-    for symbol in _ordered(values):
+    for symbol in ordered(values):
         if symbol.operation == "name":
             found.add(symbol.name)
     return found
 
 
-def written(values: Sequence[Value], prefix: str) -> tuple[dict[str, str], list[str]]:
+def written(
+    values: Sequence[Value], prefix: str, most: int = MAX_NAMES, long: int = MAX_EXPRESSION
+) -> tuple[dict[str, str], list[str]]:
     """Values as text: the entries of `let`, and an expression for each value.
 
     Args:
         prefix: what names of `let` begin with.
+        most: how many of them there may be.
+        long: from which size on a condition that is asked several times has a name, as 1 or 0.
 
     Raises:
         TooLargeError: they need more names, or larger expressions, than the language takes.
     """
-    order = _ordered(values)
+    order = ordered(values)
     uses: dict[int, int] = {}
     for symbol in order:
         for part in symbol.parts:
@@ -214,11 +218,15 @@ def written(values: Sequence[Value], prefix: str) -> tuple[dict[str, str], list[
             name = f"{prefix}{len(let) + 1}"
             let[name] = text
             text, rank, size, depth = name, 9, 1, 1
+        if symbol.operation in CONDITIONS and uses[id(symbol)] > 1 and size > long:
+            name = f"{prefix}{len(let) + 1}"
+            let[name] = f"where({text}, 1, 0)"
+            text, rank, size, depth = f"{name} > 0.5", _RANK[">"], 3, 2
         if size > MAX_EXPRESSION:
             raise TooLargeError("an expression is too long")
         texts[id(symbol)] = (text, rank, size, depth)
-    if len(let) > MAX_NAMES:
-        raise TooLargeError(f"it needs {len(let)} names for parts of the map; {MAX_NAMES} are allowed")
+    if len(let) > most:
+        raise TooLargeError(f"it needs {len(let)} names for parts of the map; {most} are allowed")
     return let, [texts[id(value)][0] if isinstance(value, Symbol) else number(value) for value in values]
 
 
@@ -227,7 +235,7 @@ def number(value: float) -> str:
     return str(int(value)) if value.is_integer() and abs(value) < 1e15 else repr(value)
 
 
-def _ordered(values: Sequence[Value]) -> list[Symbol]:
+def ordered(values: Sequence[Value]) -> list[Symbol]:
     """All symbols below, each once, parts before what is made of them."""
     found: list[Symbol] = []
     done: set[int] = set()
