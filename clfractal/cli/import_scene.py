@@ -1,4 +1,4 @@
-"""`clfractal import`: a scene file of another program's settings, and a line for all that it leaves out."""
+"""`clfractal import`: a scene file of one of another program, and a line for all that it leaves out."""
 
 from __future__ import annotations
 
@@ -9,25 +9,28 @@ from clfractal.cli.shell import Shell
 from clfractal.errors import ClfractalError, FileError, Where, unknown_name
 from clfractal.exchange.look import LOOKS
 from clfractal.files.atomic import atomic_writer, check_output
-from clfractal.files.file_kinds import kind_of
+from clfractal.files.file_kinds import OF_OTHERS, kind_of
 from clfractal.files.inputs import refuse_overwriting
 
 EXTENSIONS = (".yaml", ".yml")
 
 
-def import_scene(source: str, output: Path | None, look: str, formulas: Path | None, shell: Shell) -> None:
-    """Writes the scene of a settings file, which was checked as every scene is.
+def import_scene(
+    source: str, output: Path | None, look: str, formulas: Path | None, preset: str | None, shell: Shell
+) -> None:
+    """Writes the scene of a file of another program, which was checked as every scene is.
 
     Args:
         output: the scene file; None: one of the same name in the current folder, which is not there yet.
         look: one of LOOKS.
         formulas: the folder with the texts of formulas; None: where the program is installed.
+        preset: the name of a fragment's preset; None: `Default`, else the first one.
 
     Raises:
         ClfractalError: the file cannot be read or is none, has what has no counterpart, or the scene cannot be written.
     """
     # Here, as other commands do not need it.
-    from clfractal.exchange.mandelbulber import import_settings
+    from clfractal.exchange.kinds import import_file
     from clfractal.scene.load import load_scene
 
     if look not in LOOKS:
@@ -37,7 +40,7 @@ def import_scene(source: str, output: Path | None, look: str, formulas: Path | N
     if output is None and os.path.lexists(path):
         raise FileError("exists already and is not replaced; name another file by -o", Where(str(path)))
     refuse_overwriting([path], [source])
-    found = import_settings(Path(source), next(each for each in LOOKS if each == look), formulas)
+    found = import_file(Path(source), next(each for each in LOOKS if each == look), formulas, preset)
     try:
         load_scene(found.scene)
     except ClfractalError as error:
@@ -50,13 +53,13 @@ def import_scene(source: str, output: Path | None, look: str, formulas: Path | N
 
 
 def tell_left(source: str, shell: Shell) -> None:
-    """Says how much of a settings file that is used as a scene was not taken over."""
+    """Says how much of a file of another program that is used as a scene was not taken over."""
     path = Path(source)
-    if path.suffix.lower() != ".fract" and not (path.is_file() and kind_of(path) == "settings"):
+    if not (path.is_file() and kind_of(path) in OF_OTHERS):
         return
-    from clfractal.exchange.mandelbulber import import_settings
+    from clfractal.exchange.kinds import import_file
 
-    count = len(import_settings(path).remarks)
+    count = len(import_file(path).remarks)
     if count:
         shell.say(f"{source}: {_counted(count)} not taken over; `clfractal import` tells what")
 

@@ -65,7 +65,10 @@ def scenes(
 def import_(
     context: typer.Context,
     source: Annotated[
-        str, typer.Argument(metavar="FILE", help="A settings file of Mandelbulber 2 (.fract).")
+        str,
+        typer.Argument(
+            metavar="FILE", help="Settings of Mandelbulber 2 (.fract), or a fragment of FragM (.frag)."
+        ),
     ],
     output: Annotated[
         Path | None,
@@ -85,13 +88,19 @@ def import_(
             help="Where the texts of its formulas are.  [default: where it is installed]",
         ),
     ] = None,
+    preset: Annotated[
+        str | None,
+        typer.Option(
+            "--preset", metavar="NAME", help="A preset of a fragment.  [default: Default, else the first]"
+        ),
+    ] = None,
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> Work:
-    """Make a scene of a settings file of Mandelbulber 2, and tell what of it was not taken over."""
+    """Make a scene of a file of Mandelbulber 2 or FragM, and tell what of it was not taken over."""
     from clfractal.cli.import_scene import import_scene
 
-    return lambda: import_scene(source, output, look, formulas, context.obj)
+    return lambda: import_scene(source, output, look, formulas, preset, context.obj)
 
 
 @command

@@ -23,12 +23,36 @@ MAX_PRESETS = 1_000
 MAX_KEYS = 2_000
 _DEPTH = 8
 
-_RENDERERS = ("ray", "trac", "3d", "de-", "soft", "brute", "kn", "ibl", "render", "camera", "light", "sky", "post")
+_RENDERERS = (
+    "ray",
+    "trac",
+    "3d",
+    "de-",
+    "soft",
+    "brute",
+    "kn",
+    "ibl",
+    "render",
+    "camera",
+    "light",
+    "sky",
+    "post",
+)
 """Parts of the names of files that render."""
 _COMMENT = re.compile(r"//[^\n]*|/\*.*?(?:\*/|\Z)", re.DOTALL)
 _NO_LINE = re.compile(r"[^\n]")
 _SILENT = (
-    *("info", "group", "camera", "donotrun", "buffer", "buffershader", "texparameter", "version", "extension"),
+    *(
+        "info",
+        "group",
+        "camera",
+        "donotrun",
+        "buffer",
+        "buffershader",
+        "texparameter",
+        "version",
+        "extension",
+    ),
     *("pragma", "line", "endvertex", "shader", "synthclipboard", "subframes", "maxsubframes"),
 )
 """Lines for the program that do not change what a fragment computes."""
@@ -147,7 +171,7 @@ class _Reader:
     def _directive(self, name: str, rest: str, where: Where, depth: int) -> None:
         lower = name.lower()
         if lower == "define":
-            self.macros.define([word for word in words_of(rest, str(where.file), where.line or 1)])
+            self.macros.define(words_of(rest, str(where.file), where.line or 1))
         elif lower == "undef":
             self.macros.known.pop(rest.strip(), None)
         elif lower == "include":
@@ -193,7 +217,9 @@ class _Reader:
         if text.startswith("defined"):
             found = text.removeprefix("defined").strip(" ()\t") in self.macros.known
         else:
-            words = list(self.macros.expanded(words_of(text.strip("() \t"), str(where.file), where.line or 1)))
+            words = list(
+                self.macros.expanded(words_of(text.strip("() \t"), str(where.file), where.line or 1))
+            )
             number = words[0].text if len(words) == 1 else ""
             if len(words) == 1 and words[0].kind == "name":
                 number = "0"
@@ -216,7 +242,9 @@ class _Reader:
         path = self.folder / name if simple and self.folder is not None else None
         if path is None or not path.is_file():
             self.found.includes.append(stem)
-            self.found.remarks.append(f"line {where.line}: {name[:60]} is not beside the file; it was left out")
+            self.found.remarks.append(
+                f"line {where.line}: {name[:60]} is not beside the file; it was left out"
+            )
             return
         if len(self.found.files) >= MAX_FILES or depth >= _DEPTH:
             raise FileError(f"includes more than {MAX_FILES} files", where)

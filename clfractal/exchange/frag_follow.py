@@ -6,18 +6,28 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from clfractal.errors import FileError, Where
-from clfractal.exchange.glsl_orbit import FoundError, Orbit, OrbitRun
+from clfractal.exchange.glsl_orbit import Orbit, OrbitRun
 from clfractal.exchange.glsl_run import FixError
 from clfractal.exchange.glsl_symbols import GlslSymbols
 from clfractal.exchange.glsl_tree import SIZES, Code, Function, Uniform
 from clfractal.exchange.glsl_values import Variable
+from clfractal.exchange.glsl_walk import orbit_loop
 from clfractal.exchange.symbols import TooLargeError, Value
 
 POINT = ("point x", "point y", "point z")
 """The names of the symbols of a point's coordinates."""
 _TRIES = 300
-_GIVEN = {"orbitTrap": ("vec4", [10000.0] * 4), "fractionalCount": ("float", 0.0), "minDist": ("float", 0.005)}
-_GIVEN |= {"time": ("float", 0.0), "subframe": ("int", 0.0), "iTime": ("float", 0.0), "colorBase": ("vec3", [0.0] * 3)}
+_GIVEN = {
+    "orbitTrap": ("vec4", [10000.0] * 4),
+    "fractionalCount": ("float", 0.0),
+    "minDist": ("float", 0.005),
+}
+_GIVEN |= {
+    "time": ("float", 0.0),
+    "subframe": ("int", 0.0),
+    "iTime": ("float", 0.0),
+    "colorBase": ("vec3", [0.0] * 3),
+}
 """What files that render give to fragments."""
 
 
@@ -49,7 +59,7 @@ def follow(code: Code, file: str, values: Mapping[str, tuple[float, ...]]) -> Fo
     """
     function = _entry(code, file)
     fixed: set[str] = set()
-    loop, searching = None, True
+    loop = orbit_loop(function, code, values)
     names = {name for name, uniform in code.uniforms.items() if uniform.values is not None}
     for _ in range(_TRIES):
         symbols = GlslSymbols()
@@ -62,27 +72,16 @@ def follow(code: Code, file: str, values: Mapping[str, tuple[float, ...]]) -> Fo
             here=function.where,
             parameters=frozenset(parameters),
             loop=loop,
-            searching=searching,
         )
         try:
             distance = _follow(run, code, function, values, fixed)
         except FixError as error:
             fixed |= {parameters[name][0].name for name in error.names}
             continue
-        except FoundError as error:
-            loop, searching = error.loop, False
-            continue
         except RecursionError:
             raise FileError("is nested too deep", run.here) from None
         except TooLargeError as error:
             raise FileError(f"has no counterpart: {error}", run.here) from None
-        if searching and run.candidates:
-            loop = max(run.candidates, key=lambda each: each[0])[1]
-            searching = False
-            continue
-        if loop is not None and run.orbit is None:
-            loop = None  # what is done does not lead there
-            continue
         return Followed(symbols, distance, run.orbit, parameters, frozenset(fixed))
     raise FileError("has too many parameters that say how often something is done", function.where)
 
@@ -96,7 +95,9 @@ def _entry(code: Code, file: str) -> Function:
     if found:
         return found[0]
     if "inside" in code.functions:
-        raise FileError("tells what is inside, not a distance: a function float DE(vec3) is missing", Where(file))
+        raise FileError(
+            "tells what is inside, not a distance: a function float DE(vec3) is missing", Where(file)
+        )
     if "color" in code.functions:
         raise FileError("computes colours, not a distance: a function float DE(vec3) is missing", Where(file))
     raise FileError("a function float DE(vec3) is missing", Where(file))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -12,8 +13,16 @@ from clfractal.exchange.frag_follow import POINT, Followed
 from clfractal.exchange.glsl_orbit import TURN, Orbit
 from clfractal.exchange.glsl_symbols import numbers_of, replaced
 from clfractal.exchange.glsl_tree import WHOLE, Uniform
-from clfractal.exchange.symbols import Symbol, TooLargeError, Value, names_in, written
-from clfractal.formulas.build_orbit import MAX_STATE
+from clfractal.exchange.symbols import (
+    CONDITIONS,
+    Symbol,
+    TooLargeError,
+    Value,
+    names_in,
+    ordered,
+    written,
+)
+from clfractal.formulas.build_orbit import MAX_LETS, MAX_STATE
 from clfractal.formulas.names import check_name
 
 AXES = ("x", "y", "z", "w")
@@ -21,6 +30,7 @@ FAR = 1e9
 """A bailout for orbits that end in another way."""
 MAX_STATEMENTS = 1500
 _GOING = "going"
+_LONGEST = 600
 _SAMPLES = 24
 
 
@@ -39,6 +49,10 @@ class Writer:
     taken: set[str] = field(default_factory=lambda: {*AXES, TURN, _GOING, "reached"})
     used: set[str] = field(default_factory=set)
     """The symbols of parameters that the formula has."""
+    kept: dict[str, Symbol] = field(default_factory=dict)
+    """What is made of the point alone, by the names under which it is carried."""
+    parts: dict[int, Value] = field(default_factory=dict)
+    """Those names as symbols, by the `id` of what they stand for."""
 
     def write(self) -> dict[str, Any]:
         """The formula, but for its bounds and its degree.
@@ -64,6 +78,8 @@ class Writer:
         roots += [orbit.leaves[each].end for each in z if each in orbit.leaves]
         needed = self.needed(orbit, roots)
         beside = [each for each in orbit.leaves if each in needed and each not in z]
+        if z:
+            self.keep(orbit, [*z, *beside], flagged)
         for place, each in enumerate(z):
             self.names[each] = symbols.name(AXES[place])
         for each in beside:
@@ -73,7 +89,7 @@ class Writer:
             self.names[each] = symbols.name(shown)
         ends = [orbit.leaves[each].end for each in (*z, *beside)]
         asked = [*ends, self.followed.distance, *([orbit.exit] if flagged else [])]
-        places = [each for each in POINT if each in names_in(asked)]
+        places = [] if self.kept else [each for each in POINT if each in names_in(asked)]
         state: dict[str, Any] = {}
         if z:
             for place, each in enumerate(POINT):
@@ -102,17 +118,18 @@ class Writer:
             start = orbit.leaves[each].start
             if place < 3 and start is not self.followed.symbols.name(POINT[place]):
                 later[AXES[place]] = start
-        for each in beside:
-            shown = self.shown(each)
-            start = orbit.leaves[each].start
-            simple = isinstance(start, float) or start in [self.followed.symbols.name(name) for name in POINT]
-            state[shown] = {"start": self.plain(start, before) if simple else "0"}
-            if not simple:
+        starts = {**self.kept, **{self.shown(each): orbit.leaves[each].start for each in beside}}
+        for shown, start in starts.items():
+            begin = self.begin(start, before)
+            state[shown] = {"start": "0" if begin is None else begin}
+            if begin is None:
                 later[shown] = start
         if flagged:
-            state[_GOING] = {"start": "1"}
-            if orbit.enters != 1.0:
-                later[_GOING] = self.followed.symbols.choose(orbit.enters, 1.0, 0.0)
+            enters = self.followed.symbols.choose(orbit.enters, 1.0, 0.0)
+            begin = self.begin(enters, before)
+            state[_GOING] = {"start": "1" if begin is None else begin}
+            if begin is None:
+                later[_GOING] = enters
         if len(state) > MAX_STATE:
             raise FileError(
                 f"has no counterpart: its orbit carries {len(state)} numbers beside z; {MAX_STATE} are allowed",
@@ -120,7 +137,7 @@ class Writer:
             )
         statements: list[dict[str, Any]] = []
         if later:
-            let, texts = self.texts(list(later.values()), "s", {**self.names, **before})
+            let, texts = self.texts(list(later.values()), "s", {**self.names, **before}, first=True)
             inner = [*({name: text} for name, text in let.items()), dict(zip(later, texts, strict=True))]
             statements.append({"when": f"{TURN} == 0", "do": inner})
         targets = [*AXES[: len(z)], *(self.shown(each) for each in beside)]
@@ -129,6 +146,7 @@ class Writer:
             targets.append(_GOING)
             ends.append(self.followed.symbols.choose(orbit.exit, 0.0, 1.0))
         let, texts = self.texts(ends, "v", self.names)
+        closed, let = self.closed(let)
         changed = {name: text for name, text in zip(targets, texts, strict=True) if name != text}
         turn = [*({name: text} for name, text in let.items()), *([changed] if changed else [])]
         statements += [{"when": f"{_GOING} > 0.5", "do": turn}] if flagged and turn else turn
@@ -137,6 +155,8 @@ class Writer:
             statements = [{"x": "x"}]
         if state:
             found["state"] = state
+        if closed:
+            found["let"] = closed
         found["do"] = statements
         if len(z) == 4:
             found["slice"] = {"w": self.plain(orbit.leaves[z[3]].start, before)}
@@ -149,10 +169,17 @@ class Writer:
         """The formula with its distance and its parameters."""
         let, (text,) = self.texts([self.followed.distance], "d", self.names)
         functions: dict[str, Any] = {}
-        if let:
-            names = sorted(self.free([self.followed.distance]))
-            functions = {f"reached({', '.join(names)})": {"let": let, "value": text}}
+        known = found.get("let", {})
+        # No application asks for these, so they are computed in the end alone.
+        room = MAX_LETS - len(known)
+        known = {**known, **dict([*let.items()][:room])}
+        rest = dict([*let.items()][room:])
+        if rest:
+            own = {*rest, *(self.shown(symbol) for symbol in self.used)}
+            names = sorted({name for each in (*rest.values(), text) for name in words_of(each)} - own)
+            functions = {f"reached({', '.join(names)})": {"let": rest, "value": text}}
             text = f"reached({', '.join(names)})"
+        found = {key: value for key, value in found.items() if key != "let"}
         parameters = {}
         for symbol in sorted(self.used):
             uniform, place = self.followed.parameters[symbol]
@@ -160,7 +187,9 @@ class Writer:
         return {
             **({"parameters": parameters} if parameters else {}),
             **({"functions": functions} if functions else {}),
-            **found,
+            **{key: found[key] for key in ("variables", "state") if key in found},
+            **({"let": known} if known else {}),
+            **{key: value for key, value in found.items() if key not in ("variables", "state")},
             "add": "none",
             "degree": 1,
             "bounds": {"center": [0, 0, 0], "radius": 100},
@@ -173,14 +202,17 @@ class Writer:
 
     def named(self, name: str, place: int, size: int) -> str:
         """A name of our language for a number of a variable."""
-        plain = "".join(each if each.isalnum() and each.isascii() else "_" for each in name).strip("_")[:30] or "value"
+        plain = (
+            "".join(each if each.isalnum() and each.isascii() else "_" for each in name).strip("_")[:30]
+            or "value"
+        )
         plain = plain if plain[0].isalpha() else f"v{plain}"
         wanted = f"{plain}_{AXES[place]}" if 1 < size <= 4 else f"{plain}_{place + 1}" if size > 4 else plain
         for count in range(1, 1000):
             shown = wanted if count == 1 else f"{wanted}_{count}"
             try:
                 check_name(shown, self.taken, Where())
-            except Exception:  # noqa: BLE001, S112
+            except Exception:
                 continue
             self.taken.add(shown)
             return shown
@@ -193,18 +225,18 @@ class Writer:
         return found.name
 
     def texts(
-        self, values: Sequence[Value], prefix: str, names: Mapping[str, Value]
+        self, values: Sequence[Value], prefix: str, names: Mapping[str, Value], *, first: bool = False
     ) -> tuple[dict[str, str], list[str]]:
-        """Values as text, with names for parts of them."""
+        """Values as text, with names for parts of them; `first`: before the first turn."""
         self.used |= names_in(values) & self.followed.parameters.keys()
-        found = replaced(self.followed.symbols, values, names)
+        found = replaced(self.followed.symbols, values, names, {} if first else self.parts)
         while any(each.startswith(prefix) and each[len(prefix) :].isdecimal() for each in self.taken):
             prefix += "_"
         return written(found, prefix, most=MAX_STATEMENTS, long=12)
 
     def plain(self, value: Value, names: Mapping[str, Value]) -> str:
         """A value as text without names for parts."""
-        let, (text,) = self.texts([value], "q", {**self.names, **names})
+        let, (text,) = self.texts([value], "q", {**self.names, **names}, first=True)
         # From the last one on, as later ones are made of earlier ones.
         for name, part in reversed(let.items()):
             text = _put(text, name, part)
@@ -212,11 +244,64 @@ class Writer:
                 raise TooLargeError("an expression is too long")
         return text
 
-    def free(self, values: Sequence[Value]) -> list[str]:
-        """The names of z and of what is carried that values depend on."""
-        return [self.shown(each) for each in names_in(values) if each not in self.followed.parameters]
+    def closed(self, let: Mapping[str, str]) -> tuple[dict[str, str], dict[str, str]]:
+        """The names that depend on parameters alone, and the others."""
+        known = {self.shown(symbol) for symbol in self.used}
+        found: dict[str, str] = {}
+        for name, text in let.items():
+            if words_of(text) <= known and len(found) < MAX_LETS:
+                found[name] = text
+                known.add(name)
+        return found, {name: text for name, text in let.items() if name not in found}
+
+    def begin(self, start: Value, before: Mapping[str, Value]) -> str | None:
+        """What a number begins with, of the point's coordinates; None: it is too long for one expression."""
+        try:
+            text = self.plain(start, before)
+        except TooLargeError:
+            return None
+        return text if len(text) <= _LONGEST else None
 
     # --- what is carried
+
+    def keep(self, orbit: Orbit, turning: Sequence[str], flagged: bool) -> None:
+        """Carries what is made of the point alone, where there is room: else each turn would compute it anew."""
+        asked = [orbit.leaves[each].end for each in turning]
+        asked += [self.followed.distance, *([orbit.exit] if flagged else [])]
+        found = self.alike(asked)
+        if (
+            not found
+            or len(found) + len(turning) + 1 > MAX_STATE
+            or all(p.operation == "name" for p in found)
+        ):
+            return
+        for place, part in enumerate(found):
+            shown = self.named(f"kept{place + 1}", 0, 1)
+            self.kept[shown] = part
+            self.parts[id(part)] = self.followed.symbols.name(shown)
+
+    def alike(self, values: Sequence[Value]) -> list[Symbol]:
+        """The largest parts of values that are made of the point and parameters alone."""
+        fixed: dict[int, bool] = {}
+        order = ordered(values)
+        for symbol in order:
+            if symbol.operation == "name":
+                fixed[id(symbol)] = symbol.name in POINT
+            else:
+                used = names_in([symbol])
+                fixed[id(symbol)] = (
+                    symbol.operation not in CONDITIONS
+                    and bool(used & {*POINT})
+                    and used <= {*POINT, *self.followed.parameters}
+                )
+        outer = {id(value) for value in values} | {
+            id(part)
+            for symbol in order
+            if not fixed[id(symbol)]
+            for part in symbol.parts
+            if isinstance(part, Symbol)
+        }
+        return [symbol for symbol in order if fixed[id(symbol)] and id(symbol) in outer]
 
     def needed(self, orbit: Orbit, roots: Iterable[Value]) -> set[str]:
         """The leaves that values depend on, in later turns, too."""
@@ -245,7 +330,9 @@ class Writer:
         vectors.sort(key=lambda group: not begins(group))
         for group in vectors:
             for size in (3, 4)[: len(group) - 2]:
-                if size == 4 and names_in([orbit.leaves[group[3]].start]) - self.followed.parameters.keys() - {*POINT}:
+                if size == 4 and names_in(
+                    [orbit.leaves[group[3]].start]
+                ) - self.followed.parameters.keys() - {*POINT}:
                     continue
                 radius = self.gone(orbit, group[:size])
                 if radius is not None:
@@ -296,10 +383,13 @@ class Writer:
         return min(powers) if powers and seen > _SAMPLES // 2 else 0
 
 
+def words_of(text: str) -> set[str]:
+    """The names in an expression, but those of functions."""
+    return set(re.findall(r"\b[A-Za-z_]\w*(?!\w*\()", text)) - {"and", "or", "not"}
+
+
 def _put(text: str, name: str, part: str) -> str:
     """A text with a part in brackets where its name stands."""
-    import re
-
     return re.sub(rf"\b{name}\b", f"({part})", text)
 
 
@@ -328,4 +418,3 @@ def _parameter(uniform: Uniform, place: int, values: Mapping[str, tuple[float, .
 
 def _plain(value: float) -> float | int:
     return int(value) if float(value).is_integer() and abs(value) < 1e15 else float(value)
-

@@ -57,8 +57,24 @@ METHOD = frozenset(
     (
         *("Detail", "DetailAO", "MaxRaySteps", "MaxDistance", "Dither", "NormalBackStep", "BoundingSphere"),
         *("AntiAlias", "AntiAliasBlur", "AntiAliasScale", "GaussianWeight", "MaxRayStepsDiv", "AutoFocus"),
-        *("DebugSun", "DebugInside", "DebugNormals", "ShowDepth", "DepthToAlpha", "DepthMagnitude", "GlowMax"),
-        *("QualityShadows", "ShadowSoft", "SpecularMax", "Samples", "Stratify", "ClarityPower", "BoundingSphere"),
+        *(
+            "DebugSun",
+            "DebugInside",
+            "DebugNormals",
+            "ShowDepth",
+            "DepthToAlpha",
+            "DepthMagnitude",
+            "GlowMax",
+        ),
+        *(
+            "QualityShadows",
+            "ShadowSoft",
+            "SpecularMax",
+            "Samples",
+            "Stratify",
+            "ClarityPower",
+            "BoundingSphere",
+        ),
     )
 )
 """Keys of how their rays find the surface, and of what is shown while one looks for mistakes."""
@@ -66,7 +82,7 @@ _TRAPS = (("X", (1, 0, 0)), ("Y", (0, 1, 0)), ("Z", (0, 0, 1)), ("R", None))
 _STOPS = 48
 _FARTHEST = 2.0
 """Distances of the orbit that colours are told for."""
-_USUAL = 0.3
+_USUAL = 0.1
 
 
 @dataclass
@@ -155,7 +171,10 @@ def look_of(look: Look, camera: dict[str, Any], traps: bool) -> dict[str, Any]:
     if fog > 0:
         # Theirs weakens light by exp(-(fog^2 d)^2): ours is half gone at the same distance.
         density = math.sqrt(math.log(2)) * fog * fog
-        found["fog"] = {"color": found["background"]["top"], "density": float(f"{min(density, _LARGEST):.6g}")}
+        found["fog"] = {
+            "color": found["background"]["top"],
+            "density": float(f"{min(density, _LARGEST):.6g}"),
+        }
         found["fog"]["background"] = False
     if look.number("EnableFloor"):
         _floor(look, found)
@@ -193,16 +212,22 @@ def _lights(look: Look, camera: dict[str, Any]) -> list[dict[str, Any]]:
                 "type": "point",
                 "position": list(camera["position"]),
                 "color": decoded(lamp[:3]),
-                "intensity": look.amount(lamp[3]),
+                "intensity": look.amount(lamp[3] * (1 - _even(look))),
                 "shadow": False,
             }
         )
     return found
 
 
+def _even(look: Look) -> float:
+    """The part of the light at the camera that is everywhere: hollows are dark there, as theirs are in all light."""
+    return min(max(look.numbers("AO")[3], 0.0), 1.0) / 2
+
+
 def _material(look: Look) -> dict[str, Any]:
-    lights = look.amount(look.numbers("SpotLight")[3]) + look.amount(look.numbers("CamLight")[3])
-    least = look.amount(look.number("CamLightMin") * look.numbers("CamLight")[3]) / 2
+    lamp = look.numbers("CamLight")[3]
+    lights = look.amount(look.numbers("SpotLight")[3]) + look.amount(lamp * (1 - _even(look)))
+    least = look.amount(max(look.number("CamLightMin") / 2, _even(look)) * lamp)
     found = {
         "color": decoded(look.numbers("BaseColor")),
         "ambient": float(f"{least / max(lights, 0.05):.6g}"),
@@ -256,8 +281,12 @@ def _coloring(look: Look, traps: bool) -> dict[str, Any] | None:
     for place in range(_STOPS + 1):
         q = _FARTHEST * place / _STOPS
         parts = [part(strongest, q), *(part(key, _USUAL) for key in others)]
-        mixed = [3 * sum(each) * strength + own * (1 - strength) for *each, own in zip(*parts, base, strict=True)]
+        mixed = [
+            3 * sum(each) * strength + own * (1 - strength) for *each, own in zip(*parts, base, strict=True)
+        ]
         stops.append({"at": round(place / _STOPS, 6), "color": decoded(mixed)})
+        if len(stops) > 2 and stops[-1]["color"] == stops[-2]["color"] == stops[-3]["color"]:
+            del stops[-2]
     trap: dict[str, Any] = {"shape": "point"} if axis is None else {"shape": "plane", "direction": list(axis)}
     return {
         "by": "trap",

@@ -8,7 +8,6 @@ from typing import Any
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.exchange.frag_formula import FAR
-from clfractal.exchange.measure import degree_of, directions_of
 
 DIRECTIONS = 140
 NEAREST, STEP = 0.02, 1.2
@@ -40,12 +39,14 @@ def _measure(formula: dict[str, Any], iterations: int, eye: Sequence[float]) -> 
 
     if formula["bailout"] != FAR:
         _set_degree(formula)
+    chain = resolve({"inline": formula})
     far = 2 * math.hypot(*eye) + 20
+    # Beyond it orbits have not begun.
+    far = min(far, chain.bailout)
     count = math.ceil(math.log(far / NEAREST) / math.log(STEP))
     radii = far * STEP ** np.arange(-count, 1)
-    directions = directions_of(DIRECTIONS)
+    directions = _directions()
     points = (radii[:, None, None] * directions[None]).reshape(-1, 3)
-    chain = resolve({"inline": formula})
     found = own_distance(chain, points, min(iterations, LOOKED_AT)).reshape(len(radii), -1)
     near = (found < NEAR * radii[:, None]).any(axis=1)
     largest = radii[np.nonzero(near)[0].max()] if near.any() else radii[-1]
@@ -54,16 +55,59 @@ def _measure(formula: dict[str, Any], iterations: int, eye: Sequence[float]) -> 
 
 def _set_degree(formula: dict[str, Any]) -> None:
     """The degree: a number, or the parameter that it is."""
-    directions = directions_of(DIRECTIONS)
-    degree = degree_of(formula, directions)
+    degree = _degree(formula)
     if degree < LEAST_DEGREE:
         return
     formula["degree"] = degree
     for name, parameter in formula.get("parameters", {}).items():
         if parameter["default"] != degree:
             continue
-        changed = {**parameter, "default": degree + 1, "maximum": max(parameter.get("maximum", 0), degree + 1)}
-        trial = {**formula, "parameters": {**formula["parameters"], name: changed}}
-        if degree_of(trial, directions) == degree + 1:
+        changed = {
+            **parameter,
+            "default": degree + 1,
+            "maximum": max(parameter.get("maximum", 0), degree + 1),
+        }
+        if _degree({**formula, "parameters": {**formula["parameters"], name: changed}}) == degree + 1:
             formula["degree"] = f"max({name}, 1)"
             return
+
+
+def _degree(formula: dict[str, Any]) -> float:
+    """The power by which |z| grows far outside in the first application, in the middle of many directions."""
+    import numpy as np
+
+    from clfractal.formulas.backends import NumpyBackend
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import apply, carried_at_start, space_to_state
+
+    chain = resolve({"inline": formula})
+    directions = _directions()
+    backend = NumpyBackend()
+    lengths = []
+    for size in (1e5, 1e6):
+        point = space_to_state(chain, list(size * directions.T), backend)
+        with np.errstate(all="ignore"):
+            beside = carried_at_start(chain, point, backend)
+            found = apply(chain.first, [*point, *beside], point, backend, carried=chain.carried)[: chain.size]
+            lengths.append(np.sqrt(sum(np.broadcast_to(part, len(directions)) ** 2 for part in found)))
+    with np.errstate(all="ignore"):
+        slopes = np.log10(lengths[1] / lengths[0])
+    slopes = slopes[np.isfinite(slopes)]
+    middle = float(np.median(slopes)) if len(slopes) else 1.0
+    whole = round(middle)
+    near = float(whole) if abs(middle - whole) < 0.02 else round(middle, 2)
+    return min(max(near, 1.0), 64.0)
+
+
+def _directions() -> Any:
+    """Directions of length 1, of shape (n, 3): along axes and diagonals, and others."""
+    import numpy as np
+
+    generator = np.random.default_rng(1)
+    directions = generator.normal(size=(DIRECTIONS, 3))
+    # Thin parts lie along axes, and diagonals of planes and cubes, rather than anywhere.
+    straight = np.array(
+        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z]
+    )
+    directions = np.concatenate([straight, directions]).astype(float)
+    return directions / np.linalg.norm(directions, axis=1)[:, None]

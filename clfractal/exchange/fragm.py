@@ -60,7 +60,9 @@ def imported_fragment(fragment: Fragment, preset: str | None = None) -> Imported
     formula["step_scale"] = round(min(max(fudge, 0.01), 1.0), 6) if fudge > 0 else 1
     scene["formula"] = {"inline": formula, "iterations": max(iterations, 1)}
     scene |= view
-    has_z = followed.orbit is not None and any(name not in formula.get("state", {}) for name in _given(formula))
+    has_z = followed.orbit is not None and any(
+        name not in formula.get("state", {}) for name in _given(formula)
+    )
     traps = has_z and any(word.text == "orbitTrap" for word in fragment.words)
     scene |= look_of(look, view["camera"], traps)
     _tell(fragment, code, values, followed.fixed, look, remarks)
@@ -100,11 +102,13 @@ def _values(
     for key, setting in settings.items():
         numbers = _numbers(setting.text)
         uniform = code.uniforms.get(key)
-        wanted = SIZES.get(uniform.type, 0) if uniform is not None else len(DEFAULTS.get(key, ()))
+        wanted = SIZES.get(uniform.type, 0) if uniform is not None else 0
         if numbers is None or (wanted and len(numbers) != wanted):
-            if wanted:
+            if wanted or key in DEFAULTS:
+                wanted = wanted or len(DEFAULTS[key])
                 raise FileError(
-                    f"must be {wanted} number{'s' if wanted > 1 else ''}, got {setting.text[:40]!r}", setting.where
+                    f"must be {wanted} number{'s' if wanted > 1 else ''}, got {setting.text[:40]!r}",
+                    setting.where,
                 )
             continue
         found[key] = numbers

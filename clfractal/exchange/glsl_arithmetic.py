@@ -133,8 +133,7 @@ class GlslArithmetic(Arithmetic):
             if len(matrix.columns) != len(one):
                 self.refuse("a vector and a matrix of other sizes")
             return [self.dot(one, list(column)) for column in matrix.columns]
-        matrix, factor = (one, other) if isinstance(one, Matrix) else (other, one)
-        by = self.scalar_of(factor)
+        matrix, by = (one, self.scalar_of(other)) if isinstance(one, Matrix) else (other, self.scalar_of(one))
         return rebuilt(matrix, [self.call("*", by, part) for part in leaves_of(matrix)])
 
     def times(self, matrix: Matrix, vector: list[Value]) -> list[Value]:
@@ -148,10 +147,7 @@ class GlslArithmetic(Arithmetic):
         old = len(matrix.columns)
         return Matrix(
             tuple(
-                tuple(
-                    matrix.columns[i][j] if i < old and j < old else float(i == j)
-                    for j in range(size)
-                )
+                tuple(matrix.columns[i][j] if i < old and j < old else float(i == j) for j in range(size))
                 for i in range(size)
             )
         )
@@ -168,7 +164,9 @@ class GlslArithmetic(Arithmetic):
             self.refuse(f"{kind} of nothing")
         if len(parts) == 1:
             parts = parts * size
-        if len(parts) < size or (len(parts) > size and len(values) > 1 and len(parts) - len(leaves_of(values[-1])) >= size):
+        if len(parts) < size or (
+            len(parts) > size and len(values) > 1 and len(parts) - len(leaves_of(values[-1])) >= size
+        ):
             self.refuse(f"{kind} of {len(parts)} numbers")
         converted = [self.converted(kind, part) for part in parts[:size]]
         return converted[0] if size == 1 else converted
@@ -178,7 +176,11 @@ class GlslArithmetic(Arithmetic):
         if kind.startswith("b"):
             return self.symbols.condition(part)
         plain = self.plain(part)
-        return self.cut(plain) if kind.startswith(("int", "uint", "ivec", "uvec")) and not _whole(plain) else plain
+        return (
+            self.cut(plain)
+            if kind.startswith(("int", "uint", "ivec", "uvec")) and not _whole(plain)
+            else plain
+        )
 
     def matrix_made(self, size: int, values: Sequence[object]) -> object:
         if len(values) == 1 and isinstance(values[0], Matrix):
@@ -207,7 +209,11 @@ class GlslArithmetic(Arithmetic):
         if kind in MATRICES:
             return isinstance(value, Matrix) and len(value.columns) == MATRICES[kind]
         wanted = SIZES.get(kind, 1)
-        return len(value) == wanted if isinstance(value, list) else wanted == 1 and not isinstance(value, Matrix | Items)
+        return (
+            len(value) == wanted
+            if isinstance(value, list)
+            else wanted == 1 and not isinstance(value, Matrix | Items)
+        )
 
     def mixed(self, condition: Value, yes: object, no: object) -> object:
         """What is there after two ways to go."""
@@ -219,7 +225,9 @@ class GlslArithmetic(Arithmetic):
         found = []
         for a, b in zip(parts, others, strict=True):
             if is_condition(a) or is_condition(b):
-                found.append(self.symbols.picked(condition, self.symbols.condition(a), self.symbols.condition(b)))
+                found.append(
+                    self.symbols.picked(condition, self.symbols.condition(a), self.symbols.condition(b))
+                )
             else:
                 found.append(self.symbols.choose(condition, a, b))
         return rebuilt(yes, found)

@@ -15,7 +15,9 @@ HELPERS = frozenset(("mathutils", "complex", "complexbase", "quaternion", "quate
 
 _SAME = {
     **{name: name for name in ("abs", "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "floor")},
-    **{name: name for name in ("min", "max", "sign", "clamp", "mix", "round", "trunc", "ceil", "exp2", "fma")},
+    **{
+        name: name for name in ("min", "max", "sign", "clamp", "mix", "round", "trunc", "ceil", "exp2", "fma")
+    },
     "roundEven": "round",
     "inversesqrt": "rsqrt",
 }

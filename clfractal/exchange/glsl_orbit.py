@@ -1,34 +1,24 @@
 """Follows a fragment's distance: what is before its orbit's loop, in a turn of it, and behind it.
 
-The loop that is the orbit's is the outermost one whose turns a parameter says, or else the one with the most turns. Its
-turns become applications of a formula: they are followed once, from names for what the turn before has left.
+The loop that is the orbit's is the one around which there is no other, and which does most. Its turns become applications
+of a formula: they are followed once, from names for what the turn before has left.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 from clfractal.errors import FileError
 from clfractal.exchange.glsl_run import Flow, GlslRun, Kept
 from clfractal.exchange.glsl_symbols import leaves_of, rebuilt
-from clfractal.exchange.glsl_tree import Code, Expression, Statement
+from clfractal.exchange.glsl_tree import Expression, Statement
+from clfractal.exchange.glsl_walk import all_of, assigned
 from clfractal.exchange.symbols import COMPARISONS, Symbol, Value
 
 MAX_COUNT = 10_000
-MANY = 8
-"""Turns from which on a loop is the orbit's, whatever comes behind it."""
-FEW = 3
 TURN = "n"
 """The name of a turn's number."""
-
-
-class FoundError(Exception):
-    """The orbit's loop."""
-
-    def __init__(self, loop: Statement) -> None:
-        super().__init__()
-        self.loop = loop
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,50 +52,21 @@ class Orbit:
 
 @dataclass
 class OrbitRun(GlslRun):
-    """A run that knows the orbit's loop, or looks for it.
+    """A run that knows the orbit's loop.
 
     Attributes:
-        loop: the orbit's.
-        searching: whether it is looked for.
-        candidates: loops of known turns, with those.
+        loop: the orbit's; None: there is none.
         orbit: what was found in it.
     """
 
     loop: Statement | None = None
-    searching: bool = False
-    candidates: list[tuple[int, Statement]] = field(default_factory=list)
     orbit: Orbit | None = None
 
     def turns(self, statement: Statement) -> None:
         if statement is self.loop and self.orbit is None and not self.within:
             _Loop(self, statement).follow()
-        elif self.searching and not self.within:
-            self._look_at(statement)
         else:
             super().turns(statement)
-
-    def _look_at(self, statement: Statement) -> None:
-        """Whether a loop may be the orbit's."""
-        if statement.values and not statement.late:
-            kept = self.kept()
-            if not isinstance(self.condition(statement.values[0]), float):
-                raise FoundError(statement)
-            self.restore(kept)
-        self.counted = 0
-        try:
-            super().turns(statement)
-        except FileError:
-            raise FoundError(statement) from None
-        if self.counted > MANY:
-            raise FoundError(statement)
-        if self.counted >= FEW:
-            self.candidates.append((self.counted, statement))
-
-    counted: int = 0
-
-    def turn(self, statement: Statement) -> None:
-        self.counted += self.within == 1
-        super().turn(statement)
 
 
 class _Loop:
@@ -115,7 +76,7 @@ class _Loop:
         self.run, self.statement = run, statement
         where = statement.where
         known = [name for name in sorted(assigned([statement], run.code)) if run.scope_of(name) is not None]
-        self.returns = any(each.kind == "return" for each in _all([statement]))
+        self.returns = any(each.kind == "return" for each in all_of([statement]))
         self.before = run.kept()
         self.starts = {name: run.variable(name, where).value for name in known}
         self.groups = {
@@ -175,7 +136,9 @@ class _Loop:
     def set(self, values: dict[str, Value]) -> None:
         """Gives all variables that the loop changes their numbers."""
         for name, symbols in self.groups.items():
-            self.run.set(name, rebuilt(self.starts[name], [values[each] for each in symbols]), self.statement.where)
+            self.run.set(
+                name, rebuilt(self.starts[name], [values[each] for each in symbols]), self.statement.where
+            )
 
     def turn(self) -> dict[str, Value]:
         """The numbers after a turn, from `heads` before it; `stop` is whether it leaves the loop by itself."""
@@ -249,7 +212,9 @@ class _Loop:
             holds = run.condition(part)
             if not isinstance(holds, Symbol) or holds.operation not in COMPARISONS:
                 continue
-            each = next((name for name in counters if any(p is run.symbols.name(name) for p in holds.parts)), None)
+            each = next(
+                (name for name in counters if any(p is run.symbols.name(name) for p in holds.parts)), None
+            )
             if each is None:
                 continue
             place = 0 if holds.parts[0] is run.symbols.name(each) else 1
@@ -277,54 +242,6 @@ class _Loop:
             here += step
             turns += 1
         raise FileError(f"a loop has more than {MAX_COUNT:,} turns", self.statement.where)
-
-
-def assigned(statements: Iterable[Statement], code: Code) -> set[str]:
-    """The variables that statements may change, with those that functions they call may change outside of themselves."""
-    found: set[str] = set()
-    called: set[str] = set()
-    for expression in _expressions(statements):
-        if expression.kind in ("assign", "before", "after"):
-            found.add(_root(expression.parts[0]))
-        elif expression.kind == "call" and expression.name in code.functions:
-            for function in code.functions[expression.name]:
-                outs = zip(function.arguments, expression.parts, strict=False)
-                found |= {_root(part) for argument, part in outs if argument.out}
-            called.add(expression.name)
-    # Functions change variables outside of functions alone.
-    seen: set[str] = set()
-    while called - seen:
-        name = min(called - seen)
-        seen.add(name)
-        for function in code.functions[name]:
-            for expression in _expressions(function.body):
-                if expression.kind in ("assign", "before", "after"):
-                    found.add(_root(expression.parts[0]))
-                elif expression.kind == "call" and expression.name in code.functions:
-                    called.add(expression.name)
-    return found
-
-
-def _all(statements: Iterable[Statement]) -> Iterator[Statement]:
-    stack = [*statements]
-    while stack:
-        statement = stack.pop()
-        yield statement
-        stack += (each for block in statement.blocks for each in block)
-
-
-def _expressions(statements: Iterable[Statement]) -> Iterator[Expression]:
-    stack = [value for statement in _all(statements) for value in statement.values]
-    while stack:
-        expression = stack.pop()
-        yield expression
-        stack += expression.parts
-
-
-def _root(target: Expression) -> str:
-    while target.kind in ("member", "item"):
-        target = target.parts[0]
-    return target.name
 
 
 def _joined(values: Sequence[Expression]) -> list[Expression]:

@@ -201,18 +201,26 @@ class GlslRun(GlslValues):
         before, self.flow.left = self.flow.left, 0.0
         self.loops += 1
         self.within += 1
-        for turn in range(MAX_TURNS + 1):
-            condition = self.head(statement, first=turn == 0)
-            going = self.symbols.both(self.symbols.opposite(self.stopped()), condition)
-            if going == 0.0:
-                break
-            if turn == MAX_TURNS:
-                self.fix(going)
-                raise FileError(f"a loop has more than {MAX_TURNS} turns", statement.where)
-            self.branch(going, lambda: self.turn(statement))
+        self.turns_from(statement, 0)
         self.loops -= 1
         self.within -= 1
         self.flow.left = before
+
+    def turns_from(self, statement: Statement, turn: int) -> None:
+        """A turn of a loop, and those behind it: within each it is known that the one before was not the last."""
+        condition = self.head(statement, first=turn == 0)
+        going = self.symbols.both(self.symbols.opposite(self.stopped()), condition)
+        if going == 0.0:
+            return
+        if turn == MAX_TURNS:
+            self.fix(going)
+            raise FileError(f"a loop has more than {MAX_TURNS} turns", statement.where)
+
+        def go() -> None:
+            self.turn(statement)
+            self.turns_from(statement, turn + 1)
+
+        self.branch(going, go)
 
     def head(self, statement: Statement, *, first: bool) -> Value:
         """Whether a loop goes on."""

@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 from clfractal.exchange.symbols import (
-    FUNCTIONS,
     CONDITIONS,
+    FUNCTIONS,
     Symbol,
     Symbols,
     Value,
@@ -103,21 +103,29 @@ def rebuilt(value: object, leaves: Sequence[Value]) -> object:
     return build(value)
 
 
-def replaced(symbols: Symbols, values: Sequence[Value], names: Mapping[str, Value]) -> list[Value]:
-    """Values with others in the place of some names."""
+def replaced(
+    symbols: Symbols,
+    values: Sequence[Value],
+    names: Mapping[str, Value],
+    parts: Mapping[int, Value] | None = None,
+) -> list[Value]:
+    """Values with others in the place of some names, and of some parts, which are told by their `id`."""
+    others = parts or {}
     done: dict[int, Value] = {}
 
     def get(part: Value) -> Value:
         return part if isinstance(part, float) else done[id(part)]
 
     for symbol in ordered(values):
-        parts = tuple(get(part) for part in symbol.parts)
-        if symbol.operation == "name":
+        inner = tuple(get(part) for part in symbol.parts)
+        if id(symbol) in others:
+            done[id(symbol)] = others[id(symbol)]
+        elif symbol.operation == "name":
             done[id(symbol)] = names.get(symbol.name, symbol)
-        elif all(_same(a, b) for a, b in zip(parts, symbol.parts, strict=True)):
+        elif all(_same(a, b) for a, b in zip(inner, symbol.parts, strict=True)):
             done[id(symbol)] = symbol
         else:
-            done[id(symbol)] = _again(symbols, symbol.operation, parts)
+            done[id(symbol)] = _again(symbols, symbol.operation, inner)
     return [get(value) for value in values]
 
 

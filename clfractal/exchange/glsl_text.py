@@ -7,13 +7,34 @@ from typing import NoReturn
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.glsl_tokens import Token
-from clfractal.exchange.glsl_tree import MATRICES, TYPES, Argument, Code, Expression, Function, Statement, Uniform
+from clfractal.exchange.glsl_tree import (
+    SIZES,
+    TYPES,
+    Argument,
+    Code,
+    Expression,
+    Function,
+    Statement,
+    Uniform,
+)
 
 MAX_DEPTH = 60
 MAX_ARRAY = 64
 _QUALIFIERS = frozenset(
     (
-        *("const", "in", "out", "inout", "uniform", "varying", "attribute", "highp", "mediump", "lowp", "flat"),
+        *(
+            "const",
+            "in",
+            "out",
+            "inout",
+            "uniform",
+            "varying",
+            "attribute",
+            "highp",
+            "mediump",
+            "lowp",
+            "flat",
+        ),
         *("invariant", "smooth", "precise"),
     )
 )
@@ -73,7 +94,11 @@ class _Reader:
 
     def need(self, text: str) -> Token:
         if self.here.text != text:
-            self.refuse(f"{text!r} is missing before {self.here.text[:40]!r}" if self.here.text else f"{text!r} is missing")
+            self.refuse(
+                f"{text!r} is missing before {self.here.text[:40]!r}"
+                if self.here.text
+                else f"{text!r} is missing"
+            )
         return self.next()
 
     def name(self) -> Token:
@@ -112,7 +137,9 @@ class _Reader:
         if self.here.text == "(":
             self.function(kind, name)
             return
-        unset = "varying" in qualifiers or "attribute" in qualifiers or "in" in qualifiers or "out" in qualifiers
+        unset = (
+            "varying" in qualifiers or "attribute" in qualifiers or "in" in qualifiers or "out" in qualifiers
+        )
         found = self.declared(kind, name)
         self.statements += () if unset else found
         self.need(";")
@@ -126,12 +153,16 @@ class _Reader:
 
     def type(self) -> str:
         word = self.here
-        if word.kind != "name" or (word.text not in TYPES and word.text not in ("void",) and not word.text.startswith(
-            ("sampler", "image", "isampler")
-        )):
+        if word.kind != "name" or (
+            word.text not in TYPES
+            and word.text not in ("void",)
+            and not word.text.startswith(("sampler", "image", "isampler"))
+        ):
             if word.text == "struct":
                 self.refuse("struct is outside of the GLSL that is read")
-            self.refuse(f"a type is missing before {word.text[:40]!r}; types are float, int, bool, vec2 to vec4, mat2 to mat4")
+            self.refuse(
+                f"a type is missing before {word.text[:40]!r}; types are float, int, bool, vec2 to vec4, mat2 to mat4"
+            )
         return self.next().text
 
     def declared(self, kind: str, name: Token) -> list[Statement]:
@@ -234,14 +265,14 @@ class _Reader:
 
     def chosen(self, kind: str, name: Token, word: Token, groups: list[list[float]]) -> Uniform:
         """A uniform with its slider."""
-        from clfractal.exchange.glsl_tree import SIZES
-
         size = SIZES.get(kind, 0)
         if word.text == "file" or not size:
             return Uniform(name.text, kind, name.where)
         if word.text == "checkbox":
             values: list[float] = groups[0] if groups else [0.0]
-            return Uniform(name.text, kind, name.where, tuple(values[:1] * size), (0.0,) * size, (1.0,) * size)
+            return Uniform(
+                name.text, kind, name.where, tuple(values[:1] * size), (0.0,) * size, (1.0,) * size
+            )
         if word.text == "color":
             numbers = [each for group in groups for each in group]
             # A fourth number is a factor, with its least and largest value before it.
@@ -253,7 +284,12 @@ class _Reader:
                 self.refuse(f"color of {kind} must have {6 if size == 4 else size} numbers", word.where)
             ends = ends[:size]
             return Uniform(
-                name.text, kind, name.where, tuple(numbers), tuple(a for a, _ in ends), tuple(b for _, b in ends)
+                name.text,
+                kind,
+                name.where,
+                tuple(numbers),
+                tuple(a for a, _ in ends),
+                tuple(b for _, b in ends),
             )
         if len(groups) != 3 or any(len(group) not in (1, size) for group in groups):
             self.refuse(f"slider of {kind} must have its least, its first and its largest value", word.where)
@@ -449,7 +485,9 @@ class _Reader:
             part = self.unary()
             self.depth -= 1
             kind = "before" if word.text in ("++", "--") else "operator"
-            return Expression(kind, word.text if kind == "before" else f"unary {word.text}", (part,), word.where)
+            return Expression(
+                kind, word.text if kind == "before" else f"unary {word.text}", (part,), word.where
+            )
         return self.behind(self.first())
 
     def behind(self, value: Expression) -> Expression:
@@ -515,6 +553,3 @@ class _Reader:
 
 def _is_whole(text: str) -> bool:
     return text[:2].lower() == "0x" or text.rstrip("uU").isdecimal()
-
-
-assert not MATRICES.keys() & _QUALIFIERS

@@ -145,7 +145,13 @@ class GlslValues(GlslArithmetic):
         self.here = expression.where
         if not isinstance(found, float):
             self.refuse("an index that is not known")
-        whole = owner.values if isinstance(owner, Items) else owner.columns if isinstance(owner, Matrix) else owner
+        whole = (
+            owner.values
+            if isinstance(owner, Items)
+            else owner.columns
+            if isinstance(owner, Matrix)
+            else owner
+        )
         count = len(whole) if isinstance(whole, list | tuple) else 0
         if not 0 <= found < count:
             self.refuse(f"the index {found:g} of {count} values")
@@ -204,7 +210,15 @@ class GlslValues(GlslArithmetic):
         if expression.kind == "call":
             own = self.code.functions.get(expression.name)
             return expression.name in WHOLE or (own is not None and own[0].type in WHOLE)
-        if expression.kind == "operator" and expression.name in ("+", "-", "*", "/", "%", "unary -", "unary +"):
+        if expression.kind == "operator" and expression.name in (
+            "+",
+            "-",
+            "*",
+            "/",
+            "%",
+            "unary -",
+            "unary +",
+        ):
             return all(self.is_whole(part) for part in expression.parts)
         return False
 

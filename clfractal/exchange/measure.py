@@ -20,11 +20,18 @@ def measured(links: Sequence[dict[str, Any]], iterations: int, settings: Setting
     """The section `formula` of a scene, of members with `formula`, `count`, `start` and `stop`."""
     import numpy as np
 
-    directions = directions_of(DIRECTIONS)
+    generator = np.random.default_rng(1)
+    directions = generator.normal(size=(DIRECTIONS, 3))
+    # Thin parts lie along axes, and diagonals of planes and cubes, rather than anywhere.
+    straight = np.array(
+        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z]
+    )
+    directions = np.concatenate([straight, directions]).astype(float)
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
     done: dict[int, dict[str, Any]] = {}
     for link in links:
         if id(link["formula"]) not in done:
-            done[id(link["formula"])] = {**link["formula"], "degree": degree_of(link["formula"], directions)}
+            done[id(link["formula"])] = {**link["formula"], "degree": _degree(link["formula"], directions)}
     members = [{**link, "formula": done[id(link["formula"])]} for link in links]
     shapes = any("distance" in formula for formula in done.values())
     radius = FARTHEST if shapes else _radius(members, directions, min(iterations, LOOKED_AT))
@@ -49,20 +56,6 @@ def measured(links: Sequence[dict[str, Any]], iterations: int, settings: Setting
     return {"inline": {"title": "Hybrid", "chain": chain, **shared}, "iterations": iterations}
 
 
-def directions_of(count: int) -> Any:
-    """Directions of length 1, of shape (count + 26, 3): along axes and diagonals, and so many others."""
-    import numpy as np
-
-    generator = np.random.default_rng(1)
-    directions = generator.normal(size=(count, 3))
-    # Thin parts lie along axes, and diagonals of planes and cubes, rather than anywhere.
-    straight = np.array(
-        [(x, y, z) for x in (-1, 0, 1) for y in (-1, 0, 1) for z in (-1, 0, 1) if x or y or z]
-    )
-    directions = np.concatenate([straight, directions]).astype(float)
-    return directions / np.linalg.norm(directions, axis=1)[:, None]
-
-
 def are_inside(section: dict[str, Any], points: Sequence[Sequence[float]]) -> list[bool]:
     """Whether points are in the set of a scene's section `formula`."""
     import numpy as np
@@ -82,7 +75,7 @@ def _member(link: dict[str, Any]) -> dict[str, Any]:
     }
 
 
-def degree_of(formula: dict[str, Any], directions: Any) -> float:
+def _degree(formula: dict[str, Any], directions: Any) -> float:
     """The power by which |z| grows far outside, in the middle of many directions."""
     import numpy as np
 

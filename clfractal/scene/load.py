@@ -17,7 +17,7 @@ from clfractal.elements.lights.set import SetLight
 from clfractal.errors import ClfractalError, FileError, SceneError, Where, arguments
 from clfractal.files.document import MAX_DEPTH, read_document, read_value, write_document
 from clfractal.files.embedded import read_scene_text
-from clfractal.files.file_kinds import kind_of
+from clfractal.files.file_kinds import OF_OTHERS, kind_of
 from clfractal.files.inputs import noting
 from clfractal.files.marks import Document, node_from_plain, option
 from clfractal.files.regular import read_text_file
@@ -157,7 +157,7 @@ def read_scene(source: str | Path | Mapping[str, Any]) -> SceneText:
 
 
 def read_text(path: Path) -> str:
-    """The text of a scene file, of the scene that a picture holds, or of one that was made of another program's settings.
+    """The text of a scene file, of the scene that a picture holds, or of one that was made of another program's file.
 
     Raises:
         FileError: it cannot be read, or holds no scene.
@@ -170,11 +170,11 @@ def read_text(path: Path) -> str:
             "is a volume, not a scene: a scene shows it by renderer.file, and `clfractal mesh` makes triangles of it",
             Where(str(path)),
         )
-    if kind == "settings":
+    if kind in OF_OTHERS:
         # Imported only now: scenes of our own need nothing of it.
-        from clfractal.exchange.mandelbulber import import_settings
+        from clfractal.exchange.kinds import import_file
 
-        return import_settings(path).text(path.name)
+        return import_file(path).text(path.name)
     found = read_scene_text(path)
     if found is None:
         raise FileError("holds no scene: it was not written by clfractal", Where(str(path)))

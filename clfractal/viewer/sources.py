@@ -13,7 +13,7 @@ from typing import Any, Literal
 from clfractal.errors import ClfractalError, FileError, SceneError
 from clfractal.files import embedded
 from clfractal.files.document import read_document
-from clfractal.files.file_kinds import kind_of
+from clfractal.files.file_kinds import OF_OTHERS, kind_of
 from clfractal.files.inputs import noting
 from clfractal.files.regular import read_text_file
 from clfractal.scene.load import SceneText, load_scene, read_text
@@ -114,7 +114,7 @@ def open_source(path: str | Path) -> SceneSource:
 
 
 def is_protected(path: Path) -> bool:
-    """Whether a file must never be overwritten: it comes with the program, is a picture, or another program's settings.
+    """Whether a file must never be overwritten: it comes with the program, is a picture, or another program's.
 
     Links are followed.
     """
@@ -133,12 +133,12 @@ def suggested_name(source: SceneSource, folder: Path) -> Path:
 
 
 def is_picture(path: Path) -> bool:
-    """Whether a file is a picture of a format that may hold a scene, or the settings of another program, by its content.
+    """Whether a file is a picture of a format that may hold a scene, or a file of another program.
 
     A scene is read from it, and never saved into it.
     """
     try:
-        return embedded.is_picture(path) or kind_of(path) == "settings"
+        return embedded.is_picture(path) or kind_of(path) in OF_OTHERS
     except FileError:
         return False
 
