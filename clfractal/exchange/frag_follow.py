@@ -126,14 +126,15 @@ def _follow(
     for name, numbers in values.items():
         if name not in code.uniforms and 1 <= len(numbers) <= 4:
             kind = "float" if len(numbers) == 1 else f"vec{len(numbers)}"
-            run.outer[name] = Variable(kind, 0, numbers[0] if len(numbers) == 1 else list(numbers))
+            run.outer[name] = Variable(kind, 0, numbers[0] if len(numbers) == 1 else [*numbers])
     for name, uniform in code.uniforms.items():
         size = SIZES.get(uniform.type)
         if size is None:
             continue  # a texture
         if uniform.values is None or name in fixed:
             numbers = values.get(name) or uniform.values or (0.0,) * size
-            parts: list[Value] = [*numbers, *([0.0] * size)][:size]
+            parts: list[Value] = [*numbers[:size]]
+            parts += [0.0] * (size - len(parts))
         else:
             parts = [run.symbols.name(f"{name} of {place}") for place in range(size)]
         run.outer[name] = Variable(uniform.type, 0, parts[0] if size == 1 else parts)

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from clfractal.errors import ClfractalError, FileError, Where
 from clfractal.exchange.frag_formula import FAR
+
+if TYPE_CHECKING:
+    from clfractal.formulas.chain import Chain
 
 DIRECTIONS = 140
 NEAREST, STEP = 0.02, 1.2
@@ -17,6 +20,10 @@ MARGIN = 1.3
 LEAST_DEGREE = 1.5
 LOOKED_AT = 24
 """Applications after which the surface is taken to be where it is."""
+STRAIGHT = 26
+"""Directions along axes and diagonals."""
+MUCH = 100_000
+"""Characters of a formula times applications, from which on fewer directions are looked into."""
 
 
 def measure(formula: dict[str, Any], iterations: int, eye: Sequence[float], file: str) -> None:
@@ -35,7 +42,6 @@ def _measure(formula: dict[str, Any], iterations: int, eye: Sequence[float]) -> 
     import numpy as np
 
     from clfractal.formulas.catalog import resolve
-    from clfractal.formulas.reference import own_distance
 
     if formula["bailout"] != FAR:
         _set_degree(formula)
@@ -46,11 +52,47 @@ def _measure(formula: dict[str, Any], iterations: int, eye: Sequence[float]) -> 
     count = math.ceil(math.log(far / NEAREST) / math.log(STEP))
     radii = far * STEP ** np.arange(-count, 1)
     directions = _directions()
+    work = len(str(formula)) * min(iterations, LOOKED_AT)
+    if work > MUCH:
+        directions = directions[: max(STRAIGHT, len(directions) * MUCH // work)]
     points = (radii[:, None, None] * directions[None]).reshape(-1, 3)
-    found = own_distance(chain, points, min(iterations, LOOKED_AT)).reshape(len(radii), -1)
-    near = (found < NEAR * radii[:, None]).any(axis=1)
+    found = _distances(chain, points, min(iterations, LOOKED_AT)).reshape(len(radii), -1)
+    near = ~(found >= NEAR * radii[:, None]).all(axis=1)
     largest = radii[np.nonzero(near)[0].max()] if near.any() else radii[-1]
     formula["bounds"] = {"center": [0, 0, 0], "radius": float(f"{min(MARGIN * largest, far):.4g}")}
+
+
+def _distances(chain: Chain, points: Any, iterations: int) -> Any:
+    """The formula's own distance at points of shape (n, 3)."""
+    import numpy as np
+
+    from clfractal.formulas.backends import NumpyBackend
+    from clfractal.formulas.evaluate import evaluate
+    from clfractal.formulas.nodes import names_in
+    from clfractal.formulas.reference import apply, start
+
+    backend = NumpyBackend()
+    size, bound = chain.size, chain.first
+    with np.errstate(all="ignore"):
+        state, point = start(chain, points, backend)
+        alive = _square(state[:size]) <= chain.distance_bailout**2
+        for application in range(iterations):
+            if not alive.any():
+                break
+            after = apply(bound, state, point, backend, number=application, carried=chain.carried)
+            state = [np.where(alive, new, old) for new, old in zip(after, state, strict=True)]
+            alive &= _square(state[:size]) <= chain.distance_bailout**2
+        names: dict[str, Any] = {name: float(value) for name, value in bound.values.items()}
+        names.update(zip((*bound.formula.variables, *chain.carried), state, strict=True))
+        for name, node in bound.formula.let:
+            if name not in names and names_in(node) <= names.keys():
+                names[name] = evaluate(node, names, backend)
+        assert bound.formula.distance is not None
+        return np.broadcast_to(evaluate(bound.formula.distance, names, backend), len(points))
+
+
+def _square(state: Sequence[Any]) -> Any:
+    return sum((part * part for part in state[1:]), start=state[0] * state[0])
 
 
 def _set_degree(formula: dict[str, Any]) -> None:

@@ -133,7 +133,13 @@ class GlslArithmetic(Arithmetic):
             if len(matrix.columns) != len(one):
                 self.refuse("a vector and a matrix of other sizes")
             return [self.dot(one, list(column)) for column in matrix.columns]
-        matrix, by = (one, self.scalar_of(other)) if isinstance(one, Matrix) else (other, self.scalar_of(one))
+        if isinstance(one, Matrix):
+            return self.scaled(one, other)
+        return self.scaled(self.matrix_of(other), one)
+
+    def scaled(self, matrix: Matrix, factor: object) -> object:
+        """A matrix times a number."""
+        by = self.scalar_of(factor)
         return rebuilt(matrix, [self.call("*", by, part) for part in leaves_of(matrix)])
 
     def times(self, matrix: Matrix, vector: list[Value]) -> list[Value]:

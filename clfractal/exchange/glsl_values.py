@@ -11,7 +11,7 @@ from clfractal.exchange.glsl_arithmetic import GlslArithmetic
 from clfractal.exchange.glsl_functions import call_glsl, is_known
 from clfractal.exchange.glsl_symbols import Items, Matrix
 from clfractal.exchange.glsl_tree import MATRICES, SIZES, WHOLE, Code, Expression, Function
-from clfractal.exchange.symbols import Symbol, Value
+from clfractal.exchange.symbols import Value
 
 _LETTERS = ("xyzw", "rgba", "stpq")
 CONSTANTS: Mapping[str, float] = {"PI": math.pi, "true": 1.0, "false": 0.0}
@@ -321,8 +321,3 @@ class GlslValues(GlslArithmetic):
     def called(self, function: Function, values: list[object], expression: Expression) -> object:
         """Follows a function."""
         raise NotImplementedError
-
-
-def is_symbol(value: object) -> bool:
-    """Whether a value is not known as a number."""
-    return isinstance(value, Symbol)
