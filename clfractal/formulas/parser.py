@@ -453,7 +453,6 @@ class _Parser:
             if self.expanded[0] > MAX_EXPANDED:
                 self.fail(f"is too large with {function.name!r} written in", position)
             if name:
-                # A part that is used twice is there twice, if nothing gives it a name: each may double what is there.
                 bound[name] = self._limited(self._shared(value), position)
         return self._limited(value, position)
 
