@@ -119,13 +119,14 @@ def share_changed(picture: Picture, golden: Picture) -> float:
     return float((np.abs(picture.astype(np.int16) - golden).max(axis=-1) > 1).mean())
 
 
-def test_there_are_scenes_for_the_whole_library() -> None:
+def test_the_whole_library_is_shown_by_scenes_or_portraits() -> None:
     assert len(SCENES) >= 14
     used = set()
     for path in SCENES:
         formula = clfractal.load_scene(path).formula
         used |= {formula.name} | {link.name for link in formula.chain or ()}
-    assert set(catalog.names()) - used == set()
+    assert len(used & set(catalog.names())) >= 33
+    assert set(catalog.names()) - used <= set(maker("make_portraits").names())
 
 
 def test_the_figures_of_the_thesis_are_there() -> None:

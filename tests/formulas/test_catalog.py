@@ -53,6 +53,24 @@ RANGES: list[tuple[str, Mapping[str, float]]] = [
     *(("box_fold_bulb", {"fold": f, "fixed_radius": r}) for f, r in ((2, 3), (0.3, 1))),
     ("box_fold_quaternion", {"fold": 2, "offset": 1}),
     *(("polyhedral_ifs", {"order": o, "scale": 1.5, "face": 0.7, "edge": -0.4}) for o in (3, 4, 5)),
+    *(("menger_tesseract", {"dimension": d, "turn": 0.3, "offset": -0.2}) for d in (2, 3)),
+    ("turned_menger", {"scale": 1.8, "turn_x": 2, "center_x": 1.5}),
+    *(("lambdabulb", {"power": p, "seed_x": x, "seed_y": 0.4}) for p, x in ((2, -1.5), (9, 0.5))),
+    *((name, {"power": 3, "offset": 0.2}) for name in ("arrowheadbrot", "mousebrot")),
+    ("quaternion_phoenix", {"memory": 0.8, "offset": 0.2}),
+    ("cubic_locus", {"imaginary": 0.6}),
+    ("julibrot", {"imaginary": -1.0}),
+    ("henon_map", {"c_re": -1.1, "a_re": 0.9, "imaginary": 0.5}),
+    *(("mandelbox_4d", {"scale": s, "turn": t, "offset": 1}) for s, t in ((-1.3, 1.5), (2, 0.5), (-3, -1))),
+    *(
+        ("amazing_box_mod", {"scale": s, "wall_x": 0.5, "wall_y": 2, "center_z": c})
+        for s, c in ((-1.5, 0.8), (3, -1))
+    ),
+    *(("octahedral_box", {"scale": s, "size": z}) for s, z in ((-1.5, 2.5), (3, 0.6))),
+    *(("mandalay_box", {"scale": s, "fold": f, "gap": 1}) for s, f in ((-1.5, 1.2), (1.5, 0.2))),
+    ("inverted_sponge", {"radius": 1.7}),
+    *(("benesi_mag_tree", {"spread": s, "offset": o}) for s, o in ((0.6, 0), (2.5, 2))),
+    ("fractal_tree", {"branches": 5, "ratio": 0.78, "spread": 1.8}),
 ]
 JULIA: list[tuple[Any, Mapping[str, float]]] = [
     ({"name": name, "julia": julia}, {})
@@ -64,7 +82,7 @@ CASES: list[tuple[Any, Mapping[str, float]]] = [*((name, {}) for name in catalog
 
 def test_the_library_holds_what_it_should() -> None:
     assert set(REQUIRED) <= set(catalog.names())
-    assert len(catalog.names()) >= 32
+    assert len(catalog.names()) >= 62
 
 
 @pytest.mark.parametrize("name", catalog.names())

@@ -22,9 +22,9 @@ from clfractal.formulas.reference import (
     mp_escape,
     mp_jacobian,
     mp_orbit,
-    space_to_state,
 )
 from tests.formulas.escape_tables import CASES, TABLES, chain_of
+from tests.formulas.orbits import start_at
 from tests.formulas.own_formulas import BALL
 
 Float = NDArray[np.float64]
@@ -132,6 +132,9 @@ def test_distances_are_numbers_at_extreme_points(name: str) -> None:
 SIMILAR = [
     *("menger_sponge", "sierpinski_tetrahedron", "octahedral_ifs", "vicsek_cross"),
     *("kaleidoscopic_ifs", "polyhedral_ifs", "mandelbox", "twisted_box"),
+    *("cantor_dust", "mosely_snowflake", "jerusalem_cube", "turned_menger", "menger_tesseract"),
+    *("hexadecachoron_flake", "inverted_sponge", "mandelbox_4d", "amazing_box_mod", "octahedral_box"),
+    "pseudo_kleinian_4d",
 ]
 QUATERNIONS = ["quaternion_julia", "quaternion_mandelbrot"]
 
@@ -165,12 +168,12 @@ def test_numpy_duals_match_mpmath_duals(name: str) -> None:
     chain = catalog.load_chain(name)
     points = points_of(chain, 20)
     backend = DualBackend(NumpyBackend())
-    c = space_to_state(chain, seeded(list(points.T)), backend)
-    state: list[Any] = [np.zeros(len(points))] * chain.size if chain.add == "point" else c
+    state, c = start_at(chain, seeded(list(points.T)), backend)
     with np.errstate(all="ignore"):
         for application in range(3):
             bound = chain.link_at(application).bound
-            state = apply(bound, state, constant_of(bound, c), backend)
+            constant = constant_of(bound, c)
+            state = apply(bound, state, constant, backend, number=application, carried=chain.carried)
     for index, point in enumerate(points):
         exact = mp_jacobian(chain, list(point), 3)
         scale = max(1.0, *(abs(float(value)) for row in exact for value in row))
@@ -181,15 +184,15 @@ def test_numpy_duals_match_mpmath_duals(name: str) -> None:
                 assert number == pytest.approx(float(expected), abs=1e-9 * scale)
 
 
-def jacobian_and_rule(name: str, count: int = 12) -> list[tuple[Any, float]]:
-    """Jacobians of the map alone by the state, and the scalar rule with dr = 1 and nothing added."""
+def jacobian_and_rule(name: str, count: int = 12, number: int = 1) -> list[tuple[Any, float]]:
+    """Jacobians of the map alone by the state, and the scalar rule with dr = 1 and nothing added, in an application."""
     bound = catalog.load_chain(name).first
     formula = bound.formula
     size = len(formula.variables)
     states = np.random.default_rng(8).uniform(-2, 2, (count, size))
     found = []
     for state in states:
-        names: dict[str, Any] = {**bound.values}
+        names: dict[str, Any] = {**bound.values, "n": float(number)}
         names.update(zip(formula.variables, seeded([np.array([c]) for c in state]), strict=True))
         backend = DualBackend(NumpyBackend())
         with np.errstate(all="ignore"):
@@ -207,8 +210,10 @@ def jacobian_and_rule(name: str, count: int = 12) -> list[tuple[Any, float]]:
 
 @pytest.mark.parametrize("name", SIMILAR)
 def test_the_scalar_rule_is_the_jacobian_where_the_map_is_a_similarity(name: str) -> None:
-    for jacobian, rule in jacobian_and_rule(name):
-        np.testing.assert_allclose(jacobian.T @ jacobian, rule**2 * np.eye(3), atol=1e-9 * rule**2)
+    for jacobian, rule in [*jacobian_and_rule(name), *jacobian_and_rule(name, number=0)]:
+        np.testing.assert_allclose(
+            jacobian.T @ jacobian, rule**2 * np.eye(len(jacobian)), atol=1e-9 * rule**2
+        )
 
 
 @pytest.mark.parametrize("name", QUATERNIONS)

@@ -367,12 +367,12 @@ def oracle(chain: Chain, at: Floats, base: Any, steps: int = STEPS) -> Floats:
     # With the constant inside its map, iteration starts at 0.
     first = int(chain.add == "point" and chain.first.start is not None)
     for n in range(steps + first + 1):
-        duals = [constant_dual(z, 3) for z in state]
+        duals = [constant_dual(z, 3) for z in state[: chain.size]]
         rows = [[np.broadcast_to(v, len(at)) for v in (d.value, *d.partials)] for d in duals]
         found.append(np.array(rows, dtype=float))
         if n < steps + first:
             bound = chain.link_at(n).bound
-            state = apply(bound, state, constant_of(bound, point), backend)
+            state = apply(bound, state, constant_of(bound, point), backend, number=n, carried=chain.carried)
     return np.array(found[first:])
 
 
