@@ -1,7 +1,7 @@
 """What the installed Mandelbulber 2 renders of a settings file: where each pixel's ray met the surface.
 
 Its z-buffer, a PNG, has logarithms between the nearest and the farthest depth of the picture, and does not tell these
-two. Its picture of places in space, a PNG too, has coordinates modulo 1. Together they tell depths exactly.
+two. Its picture of places in space, a PNG too, has coordinates modulo about 1. Together they tell depths exactly.
 """
 
 from __future__ import annotations
@@ -23,9 +23,11 @@ Mask = npt.NDArray[np.bool_]
 
 PROGRAM = "mandelbulber2"
 FOLDER = Path("/usr/share/mandelbulber2")
-FINER = 20
+FINER = 200
 """How much finer their surface is found than they would at this size: theirs is thicker than the set by a pixel."""
 _NOTHING = 65535
+_TURN = 65536 / 65535
+"""Coordinates that are so far apart have the same level."""
 _OFF = (
     "shadows_enabled",
     "ambient_occlusion_enabled",
@@ -126,13 +128,13 @@ def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seco
         output = Path(folder, "picture.png")
         picture(path, output, (side, side), asked, seconds)
         levels = _read(output.with_name("picture_zbuffer.png"))[..., 0]
-        places = (_read(output.with_name("picture_world.png")) + 0.5) / 65535  # they were rounded down
+        places = _read(output.with_name("picture_world.png"))
     farthest = main.number("view_distance_max", 50.0)
     return decoded(levels, places, rays, eye, 1.01 * farthest + 0.1)
 
 
 def decoded(levels: Floats, places: Floats, rays: Floats, eye: Floats, farthest: float) -> Depths:
-    """Depths from the z-buffer's levels and from places modulo 1, shape (height, width[, 3]); none is beyond `farthest`."""
+    """Depths, none beyond `farthest`, from the levels of z-buffer and places, shape (height, width[, 3])."""
     hit = levels != _NOTHING
     t = np.full(levels.shape, np.inf)
     if not hit.any():
@@ -145,43 +147,54 @@ def decoded(levels: Floats, places: Floats, rays: Floats, eye: Floats, farthest:
         return Depths(np.where(hit, np.nan, np.inf), np.nan)
     # The logarithm of depth grows evenly with the level; levels are rounded down.
     level, log = levels[sure] + 0.5, np.log(found[sure])
-    slope, start = _line(level, log)
+    slope, start = _line(level, log, 1e-4 + 2e-5 / found[sure])
     t[hit] = np.exp(start + slope * (levels[hit] + 0.5))
     spread = float(np.median(np.abs(np.log(t[sure]) - log)))
     return Depths(t, spread)
 
 
 def _along(place: Floats, ray: Floats, eye: Floats, farthest: float) -> float:
-    """The only distance at which a ray has these coordinates modulo 1; nan if there is none, or several."""
+    """The only distance at which a ray's coordinates have these levels; nan if there is none, or several.
+
+    A coordinate's level is 65535 times it, without what is behind the point, modulo 65536.
+    """
     axis = int(np.argmax(np.abs(ray)))
-    wholes = np.arange(int(abs(ray[axis]) * farthest) + 2)
-    first = (place[axis] - eye[axis]) * np.sign(ray[axis]) % 1.0
-    candidates = (first + wholes) / abs(ray[axis])
-    # A depth that is about 0 may come out as one turn more by rounding.
-    off = (eye + candidates[:, None] * ray - place + 0.5) % 1.0 - 0.5
-    near = np.abs(off).max(axis=1) < 3e-5 + 3e-7 * candidates
-    return float(candidates[near][0]) if near.sum() == 1 else float("nan")
+    turns = np.arange(int(abs(ray[axis]) * farthest) + 2) * _TURN
+    first = (place[axis] / 65535 - eye[axis]) * np.sign(ray[axis]) % _TURN
+    # The nearest one may be about 0, and come out as one turn more by rounding.
+    candidates = np.concatenate([[first - _TURN], first + turns]) / abs(ray[axis])
+    points = eye + candidates[:, None] * ray
+    off = (place + 0.5 * np.sign(points)) / 65535 - points
+    off = (off + _TURN / 2) % _TURN - _TURN / 2
+    near = (np.abs(off).max(axis=1) < 3e-5 + 3e-7 * np.abs(candidates)) & (candidates > -1e-4)
+    if near.sum() != 1:
+        return float("nan")
+    return max(float(candidates[near][0] + off[near][0] @ ray), 1e-9)
 
 
-def _line(x: Floats, y: Floats) -> tuple[float, float]:
-    """Slope and start of the line that most points are on, some of which may be anywhere."""
+def _line(x: Floats, y: Floats, within: Floats) -> tuple[float, float]:
+    """Slope and start of the line that most points are on, to within so much in y; some may be anywhere."""
     if np.ptp(x) < 1:
         return 0.0, float(np.median(y))
     generator = np.random.default_rng(1)
-    best, slope, start = -1, 0.0, float(np.median(y))
+    best, chosen = -1, np.ones(len(x), bool)
     for _ in range(300):
         a, b = generator.integers(len(x), size=2)
         if abs(x[a] - x[b]) < 0.1 * np.ptp(x):
             continue
         tried = (y[a] - y[b]) / (x[a] - x[b])
-        off = np.abs(y - y[a] - tried * (x - x[a]))
-        count = int((off < 2e-3).sum())
-        if tried >= 0 and count > best:
-            best, slope, start = count, tried, y[a] - tried * x[a]
-    near = np.abs(y - start - slope * x) < 2e-3
-    if near.sum() >= 3 and np.ptp(x[near]) > 1:
-        slope, start = (float(each) for each in np.polyfit(x[near], y[near], 1))
-    return float(slope), float(start)
+        near = np.abs(y - y[a] - tried * (x - x[a])) < 2 * within
+        if tried >= 0 and near.sum() > best:
+            best, chosen = near.sum(), near
+    slope = start = 0.0
+    for _ in range(3):  # what is on the line of many is more than what is on that of two
+        weights = 1 / within[chosen]
+        slope, start = (float(each) for each in np.polyfit(x[chosen], y[chosen], 1, w=weights))
+        near = np.abs(y - start - slope * x) < 2 * within
+        if near.sum() < 3 or np.ptp(x[near]) < 1:
+            break
+        chosen = near
+    return slope, start
 
 
 def _read(path: Path) -> Floats:
