@@ -75,7 +75,8 @@ def verdict(record: dict[str, object]) -> str:
     middle, ninth = _number(record["middle"]), _number(record["ninth"])
     if middle > MIDDLE or ninth > NINTH:
         bad.append("depth")
-    if middle != middle:
+    # Of the deepest views theirs cannot be told.
+    if middle != middle and record.get("spread") is not None:
         bad.append("no depth")
     return ", ".join(bad) or "alike"
 

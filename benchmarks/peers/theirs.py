@@ -26,6 +26,8 @@ FOLDER = Path("/usr/share/mandelbulber2")
 FINER = 200
 """How much finer their surface is found than they would at this size: theirs is thicker than the set by a pixel."""
 _NOTHING = 65535
+_LEAST = 1e-4
+"""Depths below this cannot be told: places have steps of 1.5e-5."""
 _TURN = 65536 / 65535
 """Coordinates that are so far apart have the same level."""
 _OFF = (
@@ -143,7 +145,7 @@ def decoded(levels: Floats, places: Floats, rays: Floats, eye: Floats, farthest:
     for y, x in zip(*np.nonzero(hit), strict=True):
         found[y, x] = _along(places[y, x], rays[y, x], eye, farthest)
     sure = np.isfinite(found)
-    if sure.sum() < 3:
+    if sure.sum() < 3 or np.median(found[sure]) < _LEAST:
         return Depths(np.where(hit, np.nan, np.inf), np.nan)
     # The logarithm of depth grows evenly with the level; levels are rounded down.
     level, log = levels[sure] + 0.5, np.log(found[sure])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from clfractal.errors import FileError
+from clfractal.exchange.look import Screen
 from clfractal.exchange.settings import Section, Settings
 
 MOST_STOPS = 255
@@ -38,7 +39,7 @@ def coloring_of(settings: Settings, remarks: list[str]) -> dict[str, Any] | None
     wanted = main.flag("mat1_use_colors_from_palette", True) and main.flag("fractal_color", True)
     if not main.flag("mat1_surface_gradient_enable", True) or not wanted:
         return None
-    stops = _stops(main, before)
+    stops = _stops(main, before, Screen.of(main))
     hybrid = main.flag("hybrid_fractal_enable", False)
     number = main.whole("formula_1", 2)
     units = 1000 if hybrid else _UNITS.get(number, 5000)
@@ -57,7 +58,7 @@ def coloring_of(settings: Settings, remarks: list[str]) -> dict[str, Any] | None
     }
 
 
-def _stops(main: Section, before: str) -> list[dict[str, Any]]:
+def _stops(main: Section, before: str, screen: Screen) -> list[dict[str, Any]]:
     """The palette: colours at positions, the first one once more at the end, as the palette repeats."""
     key = f"{before}surface_color_gradient"
     if key not in main.entries and f"{before}surface_color_palette" in main.entries:
@@ -78,9 +79,16 @@ def _stops(main: Section, before: str) -> list[dict[str, Any]]:
     pairs.sort(key=lambda pair: pair[0])
     step = -(-len(pairs) // MOST_STOPS)
     stops: list[dict[str, Any]] = [
-        {"at": round(place / LENGTH, 6), "color": f"#{main.code(key, word, 0xFFFFFF):06x}"}
+        {"at": round(place / LENGTH, 6), "color": _shown(main.code(key, word, 0xFFFFFF), screen)}
         for place, word in pairs[::step]
     ]
     if len(stops) == 1 or stops[-1]["at"] < 1:
         stops.append({"at": 1, "color": stops[0]["color"]})
     return stops
+
+
+def _shown(code: int, screen: Screen) -> str | list[float]:
+    """A colour of the palette, as it comes on a screen."""
+    if screen.gamma == 1:
+        return f"#{code:06x}"
+    return screen.color([(code >> shift & 255) / 255 for shift in (16, 8, 0)])

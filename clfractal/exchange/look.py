@@ -1,13 +1,15 @@
 """Light, colours, background, fog and limits of a settings file.
 
-Their colours and intensities are what a screen shows; ours are amounts of light, which a screen shows by sRGB's curve. A
-colour becomes that of the same look on a screen, an intensity the one that makes a white surface facing it look the same.
+Their colours and intensities are what a screen shows, before their `gamma`; ours are amounts of light, which a screen shows
+by the curve of sRGB. A colour becomes that of the same look on a screen. Theirs add light from everywhere and from lamps
+as screens show it, ours add amounts, which is less; so lamps are stronger the more light there is from everywhere.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any, Literal
 
 from clfractal.exchange.settings import Section, Settings
@@ -21,6 +23,15 @@ _LAMPS = 4
 _LAMP_FACTOR = 100 / 24
 """What arrives of a lamp of intensity 1 at a distance of 1."""
 _LARGEST = 1e6
+_FACING = 0.75
+"""The cosine at which a surface in the main light is as bright as theirs: at others ours change more slowly."""
+_STEPS = 15
+"""Of theirs on a way to the surface, times their `DE_factor`: what glow grows with. It covers what is behind, ours adds."""
+_LEAST_GLOW = 1e-3
+_HALF = 0.5
+"""The part of all directions that a flat surface sees, of which their occlusion by rays and by depths is a part."""
+_BACK = 10
+"""How much stronger than the light from everywhere is a lamp that only brings it, from behind."""
 _BLUE, _WHITE, _GREEN = (0x0000, 0x95A2, 0xFFFF), (0xFFFF, 0xFFFF, 0xFFFF), (0x0000, 0x2710, 0x01F4)
 
 
@@ -31,12 +42,15 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
         FileError: a value is none of its kind.
     """
     main = settings.main
-    lights = [*_main_light(main, camera), *_lamps(main, camera)]
-    material = _material(main, lights, remarks)
+    screen = Screen.of(main)
+    everywhere = _everywhere(main)
+    lights = [*_main_light(main, camera, screen, everywhere), *_lamps(main, camera, screen)]
+    ambient = _ambient(screen.amount(everywhere), lights, camera)
+    material = _material(main, ambient, screen, remarks)
     found: dict[str, Any] = {
         "lights": lights,
         "material": material,
-        "background": _background(main, camera, remarks),
+        "background": _background(main, camera, screen, remarks),
         "renderer": {"samples": 4},
     }
     if "f_number" in camera:
@@ -44,18 +58,42 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
     if material.get("reflection", 0) > 0:
         found["renderer"]["bounces"] = min(max(main.whole("reflections_max", 5), 0), 16)
     if _occlusion(main) > 0:
-        found["renderer"]["ambient_occlusion"] = {"rays": 4}
+        found["renderer"]["ambient_occlusion"] = {"rays": 4, "distance": _seen_height(camera)}
     for key, section in (
-        ("fog", _fog(main)),
-        ("glow", _glow(main)),
+        ("fog", _fog(main, screen, found["background"])),
+        ("glow", _glow(main, camera, screen)),
         ("objects", _limits(main)),
-        ("output", _output(main, remarks)),
+        ("output", _output(main, screen, remarks)),
     ):
         if section:
             found[key] = section
     if look == "ours":
         _lit_by_ours(found)
     return found
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """What becomes of their numbers on a screen: they are raised to 1/gamma."""
+
+    gamma: float = 1.0
+
+    @classmethod
+    def of(cls, main: Section) -> Screen:
+        return cls(min(max(main.number("gamma", 1.0), 0.2), 5.0))
+
+    @property
+    def power(self) -> float:
+        """Of what may be above 1, about."""
+        return _CURVE / self.gamma
+
+    def amount(self, value: float) -> float:
+        """An amount of light on their screen, which may be above 1, as one of ours."""
+        return float(f"{min(max(value, 0.0) ** self.power, _LARGEST):.6g}")
+
+    def color(self, color: Sequence[float]) -> list[float]:
+        """A colour of theirs, 0 to 1, as linear light."""
+        return decoded([min(max(part, 0.0), 1.0) ** (1 / self.gamma) for part in color])
 
 
 def decoded(color: Sequence[float]) -> list[float]:
@@ -66,12 +104,39 @@ def decoded(color: Sequence[float]) -> list[float]:
     ]
 
 
-def _amount(value: float) -> float:
-    """An amount of light on their screen, which may be above 1, as one of ours."""
-    return float(f"{min(max(value, 0.0) ** _CURVE, _LARGEST):.6g}")
+def _seen_height(camera: dict[str, Any]) -> float:
+    """The height of the picture where the camera looks at, scene units: how far away occlusion is sought, about."""
+    away = math.dist(camera["position"], camera["target"])
+    height = 2 * away * math.tan(math.radians(camera["fov"] / 2))
+    return float(f"{min(max(0.3 * height, 1e-9), _LARGEST):.4g}")
 
 
-def _main_light(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
+def _everywhere(main: Section) -> float:
+    """Light that comes from all sides, on their screen."""
+    # A flat surface has half of their occlusion's light, but for the kind that looks along the normal.
+    seen = 1.0 if main.text("ambient_occlusion_mode").strip() in ("0", "fast") else _HALF
+    return max(main.color("fill_light_color", (0, 0, 0))) + _occlusion(main) * seen
+
+
+def _ambient(amount: float, lights: list[dict[str, Any]], camera: dict[str, Any]) -> float:
+    """The material's part of each light that reaches everywhere, so that it is this amount in all.
+
+    Without a directional light one is added: from behind, where no surface that the camera sees is lit by it.
+    """
+    if amount <= 0:
+        return 0.0
+    brightest = sum(light["intensity"] for light in lights if light.get("type") != "point")
+    if brightest <= 0:
+        _, forward, _ = _axes(camera)
+        brightest = _BACK * amount
+        direction = [round(-each, 9) + 0.0 for each in forward]
+        lights.append({"direction": direction, "intensity": float(f"{brightest:.6g}")})
+    return float(f"{amount / max(brightest, 0.05):.6g}")
+
+
+def _main_light(
+    main: Section, camera: dict[str, Any], screen: Screen, everywhere: float
+) -> list[dict[str, Any]]:
     alpha, beta = (
         math.radians(main.number(f"main_light_{name}", default))
         for name, default in (("alpha", -45), ("beta", 45))
@@ -89,8 +154,8 @@ def _main_light(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
         x, y, z = (x * right[i] + y * forward[i] + z * up[i] for i in range(3))
     light: dict[str, Any] = {
         "direction": [round(-each, 9) + 0.0 for each in (x, y, z)],
-        "color": decoded(color),
-        "intensity": _amount(intensity),
+        "color": screen.color(color),
+        "intensity": screen.amount(_beside(intensity, everywhere, screen.power)),
     }
     if not shadow:
         light["shadow"] = False
@@ -100,7 +165,13 @@ def _main_light(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
     return [light]
 
 
-def _lamps(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
+def _beside(intensity: float, everywhere: float, power: float) -> float:
+    """What to take for a light's intensity, so that with that from everywhere a surface is as bright as theirs."""
+    added = (_FACING * intensity + everywhere) ** power - everywhere**power
+    return float((added / _FACING) ** (1 / power))
+
+
+def _lamps(main: Section, camera: dict[str, Any], screen: Screen) -> list[dict[str, Any]]:
     """Lamps at points. Light weakens with the square of the distance; on their screen it does so in code values."""
     found = []
     whole = main.number("aux_light_intensity", 1.0)
@@ -123,8 +194,8 @@ def _lamps(main: Section, camera: dict[str, Any]) -> list[dict[str, Any]]:
                 "type": "point",
                 "position": list(position),
                 "falloff": "inverse_square",
-                "color": decoded(color),
-                "intensity": float(f"{min(_amount(arriving) * away**2, _LARGEST):.6g}"),
+                "color": screen.color(color),
+                "intensity": float(f"{min(screen.amount(arriving) * away**2, _LARGEST):.6g}"),
             }
         )
     return found
@@ -147,13 +218,15 @@ def _unit(vector: Sequence[float]) -> list[float]:
 
 
 class _Surface:
-    """The first material. Until version 2.08 its keys stood without `mat1_` before them."""
+    """The first material. Until version 2.08 its keys stood without `mat1_` before them, and one had another name."""
 
     def __init__(self, main: Section) -> None:
         self.main = main
 
     def key(self, name: str) -> str:
         new = f"mat1_{name}"
+        if name == "reflectance" and new not in self.main.entries and "reflect" in self.main.entries:
+            return "reflect"
         return name if new not in self.main.entries and name in self.main.entries else new
 
 
@@ -163,23 +236,21 @@ def _occlusion(main: Section) -> float:
     return main.number("ambient_occlusion", 1.0) if enabled else 0.0
 
 
-def _material(main: Section, lights: list[dict[str, Any]], remarks: list[str]) -> dict[str, Any]:
+def _material(main: Section, ambient: float, screen: Screen, remarks: list[str]) -> dict[str, Any]:
     surface = _Surface(main)
     color = main.color(surface.key("surface_color"), (0xC350, 0xC350, 0xC350))
     specular = main.number(surface.key("specular"), 1.0)
     width = max(main.number(surface.key("specular_width"), 0.05), 1e-3)
-    everywhere = max(main.color("fill_light_color", (0, 0, 0))) + _occlusion(main)
-    brightest = sum(light["intensity"] for light in lights if light.get("type") != "point")
     found: dict[str, Any] = {
-        "color": decoded(color),
-        "ambient": float(f"{_amount(everywhere * 0.5) / max(brightest, 0.05):.6g}") if everywhere else 0,
+        "color": screen.color(color),
+        "ambient": ambient,
         "diffuse": 1,
         "specular": round(min(max(specular, 0.0), 1.0) * 0.5, 6),
         # Theirs is a power of the cosine with the half vector, which is about the fourth of Phong's exponent.
         "shininess": round(min(max(30 / width / 4, 1.0), 10_000.0), 6),
     }
     if not main.flag("raytraced_reflections", False):
-        main.without((surface.key("reflectance"), "reflections_max", "reflect"))
+        main.without((surface.key("reflectance"), "reflections_max"))
     else:
         found["reflection"] = round(min(max(main.number(surface.key("reflectance"), 0.0), 0.0), 1.0), 6)
     if main.number(surface.key("transparency_of_surface"), 0.0) > 0:
@@ -187,7 +258,7 @@ def _material(main: Section, lights: list[dict[str, Any]], remarks: list[str]) -
     return found
 
 
-def _background(main: Section, camera: dict[str, Any], remarks: list[str]) -> dict[str, Any]:
+def _background(main: Section, camera: dict[str, Any], screen: Screen, remarks: list[str]) -> dict[str, Any]:
     """Their colours follow how far a ray points up; ours go from the top of the picture to its bottom."""
     first, second, third = (
         main.color(f"background_color_{number}", default)
@@ -199,11 +270,8 @@ def _background(main: Section, camera: dict[str, Any], remarks: list[str]) -> di
         remarks.append("textured_background: the picture behind the set is not taken over")
 
     def seen(up: float) -> list[float]:
-        if three:
-            part, ends = abs(up), (second, first if up >= 0 else third)
-        else:
-            part, ends = (up + 1) / 2, (second, first)
-        return decoded([bright * (a * (1 - part) + b * part) for a, b in zip(*ends, strict=True)])
+        part, ends = (abs(up), (second, first if up >= 0 else third)) if three else (0.0, (first, first))
+        return screen.color([bright * (a * (1 - part) + b * part) for a, b in zip(*ends, strict=True)])
 
     _, forward, top = _axes(camera)
     half = math.tan(math.radians(camera["fov"] / 2))
@@ -213,7 +281,8 @@ def _background(main: Section, camera: dict[str, Any], remarks: list[str]) -> di
     return {"top": seen(above[2]), "bottom": seen(below[2])}
 
 
-def _fog(main: Section) -> dict[str, Any] | None:
+def _fog(main: Section, screen: Screen, background: dict[str, Any]) -> dict[str, Any] | None:
+    """Fog on the way to the surface, and to where they look no farther: what is behind it is mixed with its colour here."""
     color = main.color("basic_fog_color", (0xE807, 0xEF12, 0xFFFF))
     visibility = main.number("basic_fog_visibility", 20.0)
     if not main.flag("volumetric_fog_enabled", False):
@@ -222,17 +291,27 @@ def _fog(main: Section) -> dict[str, Any] | None:
         main.without(main.beginning("iteration_fog_"))
     if not main.flag("basic_fog_enabled", False) or visibility <= 0:
         return None
-    return {"color": decoded(color), "density": float(f"{min(1 / visibility, _LARGEST):.6g}")}
+    through = math.exp(-max(main.number("view_distance_max", 50.0), 0.0) / visibility)
+    own = screen.color(color)
+    for side, seen in background.items():
+        background[side] = [round(through * a + (1 - through) * b, 6) for a, b in zip(seen, own, strict=True)]
+    return {"color": own, "density": float(f"{min(1 / visibility, _LARGEST):.6g}"), "background": False}
 
 
-def _glow(main: Section) -> dict[str, Any] | None:
-    """Theirs grows with the steps of a ray, up to its own colour and no further; ours with how near it passes."""
+def _glow(main: Section, camera: dict[str, Any], screen: Screen) -> dict[str, Any] | None:
+    """Theirs grows with the steps of a ray, up to its own colour and no further; ours with how near it passes.
+
+    Where it is weak, as in most files, it is not seen in either.
+    """
     outer = main.color("glow_color_2", (0xDF68, 0xEDD8, 0xF3C8))
     main.color("glow_color_1", (0xA018, 0xAEA9, 0xC152))
     intensity = main.number("glow_intensity", 0.2)
     if not main.flag("glow_enabled", True) or intensity <= 0:
         return None
-    return {"color": decoded(outer), "intensity": _amount(min(intensity, 1.0))}
+    amount = screen.amount(min(intensity * _STEPS / 512, 0.5))
+    if amount < _LEAST_GLOW:
+        return None
+    return {"color": screen.color(outer), "intensity": amount, "width": 0.2 * _seen_height(camera)}
 
 
 def _limits(main: Section) -> dict[str, Any] | None:
@@ -250,14 +329,14 @@ def _limits(main: Section) -> dict[str, Any] | None:
     }
 
 
-def _output(main: Section, remarks: list[str]) -> dict[str, Any]:
+def _output(main: Section, screen: Screen, remarks: list[str]) -> dict[str, Any]:
     found: dict[str, Any] = {}
     bright = main.number("brightness", 1.0)
     if bright > 0 and bright != 1:
-        found["exposure"] = round(min(max(math.log2(bright) * _CURVE, -20), 20), 6)
+        found["exposure"] = round(min(max(math.log2(bright) * screen.power, -20), 20), 6)
     if main.flag("hdr", False):
         found["tone"] = "reinhard"
-    for key in ("gamma", "contrast", "saturation"):
+    for key in ("contrast", "saturation"):
         if abs(main.number(key, 1.0) - 1) > 0.05:
             remarks.append(f"{key}: {main.number(key, 1.0):g} is not taken over")
     return found

@@ -27,6 +27,9 @@ _NEVER = 250
 """`formula_stop_iteration` of a formula that goes on to the end; a file may have more iterations."""
 _TRANSFORMS = 1000
 _SHAPES = range(600, 800)
+_DISCS = (103, 104, 117)
+"""Formulas of the Pseudo Kleinian."""
+_TUBE = "analyticDE.scale1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +89,8 @@ def formula_of(settings: Settings, installed: Installed | None, remarks: list[st
         if main.number("formula_scale_1", 1.0) != 1:
             remarks.append("formula_scale_1: the first formula keeps its own size")
     plan = _plan(settings, "_1" if joined else "", installed, remarks)
-    section = _by_library(plan, slots[0]) if len(slots) == 1 else None
+    alone = len(slots) == 1 and (installed is None or not _has_discs(plan, slots))
+    section = _by_library(plan, slots[0]) if alone else None
     if section is None:
         section = _by_texts(plan, slots, main.whole("repeat_from", 1))
     if not joined:
@@ -286,8 +290,15 @@ def _all_followed(
     """The formula of each application: of three numbers, if that is enough, and with what has to be carried."""
     first = texts[slots[0].slot].parameters
     four = plan.w != 0
+    tube = None
+    if _has_discs(plan, slots):
+        found = next(texts[slot.slot].parameters for slot in slots if slot.number in _DISCS).value(_TUBE)
+        tube = found if isinstance(found, float) else None
+        carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
-        following = Following(Space(four=four, mirrored=plan.mirrored), first, carried, shift, plan.folds)
+        following = Following(
+            Space(four=four, mirrored=plan.mirrored), first, carried, shift, plan.folds, tube
+        )
         try:
             return _followed(plan, slots, texts, order, following), following
         except NeedsFourError:
@@ -297,6 +308,13 @@ def _all_followed(
                 raise
             # Distances to shapes are divided by how much space was enlarged.
             carried = (*carried, *((error.name, "DE") if error.name == "dist" else (error.name,)))
+
+
+def _has_discs(plan: Plan, slots: Sequence[Slot]) -> bool:
+    """Whether distances are those to discs at the end of orbits: all formulas are of that kind, or transforms."""
+    kinds = [slot.number in _DISCS for slot in slots if slot.number < _TRANSFORMS]
+    wanted = plan.settings.main.text("delta_DE_function").strip()
+    return bool(kinds) and all(kinds) and wanted in ("", "0", "3", "preferred", "pseudo_kleinian")
 
 
 def _later(link: dict[str, Any]) -> dict[str, int]:

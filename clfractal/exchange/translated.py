@@ -26,6 +26,8 @@ from clfractal.exchange.translate import (
 )
 
 _TITLE = 60
+_STEP_SCALE = 0.7
+"""Of distances that are a little too large."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +79,7 @@ class Following:
         first: the first formula's parameters, which give the scale that an orbit begins with.
         carried: the fields that formulas carry, as they depend on z.
         folds: what is done to z before each application.
+        tube: radius of the tube about the z axis in which the Pseudo Kleinian's orbits end; None: of other formulas.
         shift: how much `n` is above their number of an application; None: applications are formulas of their own.
     """
 
@@ -85,6 +88,7 @@ class Following:
     carried: tuple[str, ...] = ()
     shift: int | None = None
     folds: Folds = NO_FOLDS
+    tube: float | None = None
     symbols: Symbols = field(default_factory=Symbols)
     state: State = field(init=False)
     done: dict[tuple[object, ...], list[Applied]] = field(default_factory=dict)
@@ -154,7 +158,16 @@ class Following:
             carried_name(name): {"start": begin[name], "next": following.get(name, carried_name(name))}
             for name in self.carried
         }
-        return {"state": state, **({"distance": carried_name("dist")} if "dist" in self.carried else {})}
+        found: dict[str, Any] = {"state": state}
+        if "dist" in self.carried:
+            found["distance"] = carried_name("dist")
+        elif self.tube is not None:
+            # Knighty's distance to a disc: within a tube about the z axis, and in the plane z = 0.
+            across = "sqrt(x*x + y*y)"
+            flat = f"{across}*abs(z)/sqrt(max(x*x + y*y + z*z, 1e-30))"
+            found["distance"] = f"max({across} - {self.tube:.9g}, {flat})/{carried_name('DE')}"
+            found["step_scale"] = _STEP_SCALE
+        return found
 
     def _added(self, z: Sequence[Value], addition: Addition) -> tuple[list[Value], bool]:
         """The map, with what is added but what our language adds by itself; and whether that is the point."""

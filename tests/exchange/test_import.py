@@ -145,8 +145,13 @@ class TestScenes:
         single = imported("mat1_use_colors_from_palette false;\nmat1_surface_color ffff 0 8000;").scene
         assert "coloring" not in single
         assert single["material"]["color"][:2] == [1, 0]
-        assert "glow" in single
-        assert imported(f"{CAMERA}\nglow_intensity 9;").scene["glow"]["intensity"] == 1
+        # Theirs is weak by default: nobody sees it.
+        assert "glow" not in single
+        strong = imported("glow_intensity 15;\nglow_color_2 ffff 0 8000;").scene["glow"]
+        assert strong["color"][:2] == [1, 0]
+        assert strong["intensity"] == pytest.approx((15 * 15 / 512) ** 2.2, rel=1e-4)
+        most = imported(f"{CAMERA}\nglow_intensity 90;").scene["glow"]["intensity"]
+        assert most == pytest.approx(0.5**2.2, rel=1e-4)
         assert "glow" not in scene
 
     def test_background_is_what_is_seen_above_and_below(self) -> None:
@@ -167,9 +172,46 @@ class TestScenes:
         assert found.scene["fog"]["density"] == 0.25
         assert found.scene["objects"]["limits"]["position"] == [0, -1, 0]
         assert found.scene["objects"]["limits"]["size"] == [2, 2, 6]
-        assert found.scene["output"] == {"exposure": 2.2, "tone": "reinhard"}
-        assert found.remarks == ("gamma: 0.5 is not taken over",)
+        assert found.scene["output"] == {"exposure": 4.4, "tone": "reinhard"}
+        assert found.remarks == ()
         load_scene(found.scene)
+
+    def test_gamma_is_that_of_all_colours(self) -> None:
+        keys = "background_3_colors_enable false;\nbackground_color_1 8000 ffff 0;\ngamma 0.5;\nshadows_enabled false;"
+        scene = imported(f"{CAMERA}\n{keys}\nmat1_surface_color_gradient 0 800000 5000 00ff00;").scene
+        # Half of the screen's white is a quarter with this gamma, which sRGB shows of 0.0509 of the light.
+        assert scene["background"]["top"] == pytest.approx([0.0513, 1, 0], abs=5e-4)
+        assert scene["coloring"]["palette"][0]["color"][0] == pytest.approx(0.0513, abs=5e-4)
+        brighter = imported(f"{CAMERA}\n{keys}\nmain_light_intensity 2;").scene["lights"][0]["intensity"]
+        assert brighter / scene["lights"][0]["intensity"] == pytest.approx(2**4.4, rel=1e-4)
+
+    def test_fog_in_front_of_the_background(self) -> None:
+        keys = "basic_fog_enabled true;\nbasic_fog_visibility 4;\nbasic_fog_color ffff 0 0;\nview_distance_max 4;"
+        black = "".join(f"background_color_{number} 0 0 0;\n" for number in (1, 2, 3))
+        scene = imported(f"{CAMERA}\n{black}{keys}").scene
+        assert scene["background"]["top"] == pytest.approx([1 - math.exp(-1), 0, 0], abs=1e-5)
+        assert scene["fog"]["background"] is False
+
+    def test_light_from_everywhere(self) -> None:
+        occluded = "ambient_occlusion_enabled true;\nambient_occlusion 0.8;\ncamera_distance_to_target 1;"
+        scene = imported(f"{CAMERA}\n{occluded}").scene
+        (light,) = scene["lights"]
+        # A flat surface sees half of it: 0.4 of the screen's white, beside the light as it is at a cosine of 3/4.
+        assert scene["material"]["ambient"] * light["intensity"] == pytest.approx(0.4**2.2, rel=1e-4)
+        whole = scene["material"]["ambient"] * light["intensity"] + 0.75 * light["intensity"]
+        assert whole == pytest.approx((0.75 + 0.4) ** 2.2, rel=1e-4)
+        assert 0 < scene["renderer"]["ambient_occlusion"]["distance"] < 2
+        # Without a lamp it is there all the same, from behind.
+        alone = imported(f"{CAMERA}\n{occluded}\nmain_light_enable false;").scene
+        (behind,) = alone["lights"]
+        forward = np.subtract(alone["camera"]["target"], alone["camera"]["position"])
+        assert np.dot(behind["direction"], forward) == pytest.approx(-np.linalg.norm(forward))
+        assert alone["material"]["ambient"] * behind["intensity"] == pytest.approx(0.4**2.2, rel=1e-4)
+        load_scene(alone)
+
+    def test_mirrors_of_old_files(self) -> None:
+        keys = "raytraced_reflections true;\nreflect 0.9;"
+        assert imported(f"{CAMERA}\n{keys}").scene["material"]["reflection"] == 0.9
 
     def test_depth_of_field(self) -> None:
         scene = load_scene(imported(f"{CAMERA}\nDOF_enabled true;\nDOF_focus 4;\nDOF_radius 5;").scene)

@@ -32,7 +32,7 @@ def _rays(side: int) -> tuple[np.ndarray, np.ndarray]:
     return rays, np.array([0.3, -7.7, 2.1])
 
 
-@pytest.mark.parametrize("scale", [3e-4, 0.01, 1.0, 9.0])
+@pytest.mark.parametrize("scale", [4e-4, 0.01, 1.0, 9.0])
 def test_depths_from_levels_and_places(scale: float) -> None:
     rays, eye = _rays(24)
     generator = np.random.default_rng(3)
@@ -94,7 +94,8 @@ def test_verdicts_and_summary() -> None:
         good,
         good | {"union": 0.9},
         good | {"union": 0.9, "covered": 0.95, "ninth": 0.1},
-        good | {"middle": None},
+        good | {"middle": None, "spread": 0.0},
+        good | {"middle": None, "spread": None},
         good | {"dropped": ["perspective_type"]},
         {"stage": "open", "error": "x", "dropped": []},
         {"stage": "theirs", "error": "x", "dropped": []},
@@ -104,13 +105,14 @@ def test_verdicts_and_summary() -> None:
         "silhouette",
         "depth",
         "no depth",
+        "alike",
         "dropped",
         "not opened",
         "theirs",
     ]
     lines = causes.summary(records)
-    assert lines[0] == "7 files, 5 open (71.4 %)"
-    assert "2 of 3 that cover 5 to 90 % are alike (66.7 %)" in lines[1]
+    assert lines[0] == "8 files, 6 open (75.0 %)"
+    assert "3 of 4 that cover 5 to 90 % are alike (75.0 %)" in lines[1]
 
 
 def test_what_is_dropped() -> None:

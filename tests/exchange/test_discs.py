@@ -1,0 +1,43 @@
+"""Formulas whose orbits end at a disc, as the Pseudo Kleinian's: distances are those to the disc."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from clfractal.exchange.mandelbulber import import_text
+from clfractal.formulas.catalog import resolve
+from clfractal.formulas.reference import own_distance
+from tests.exchange.files import program, settings
+
+# A fold of the tests' own under the name of one whose orbits end at a disc, with a scale that its derivative grows by.
+DISC = """REAL4 OwnDiscIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	z = fabs(z) * 2.0f - (REAL4){1.0f, 0.0f, 0.0f, 0.0f};
+	aux->DE = aux->DE * 2.0f;
+	aux->pseudoKleinianDE = fractal->analyticDE.scale1;
+	return z;
+}
+"""
+
+
+def test_distances_to_discs(tmp_path: Path) -> None:
+    folder = program(tmp_path, pseudo_kleinian_mod1=DISC)
+    found = import_text(
+        settings("formula_1 104;\nN 2;", "analyticDE_scale_1 0.5;"), "x.fract", formulas=folder
+    )
+    scene = found.scene["formula"]
+    points = np.array([[0.2, 0.3, 0.4], [0.75, 0.0, 0.05]])
+    measured = own_distance(resolve(scene), points, 2)
+    for point, distance in zip(points, measured, strict=True):
+        z = point
+        for _ in range(2):
+            z = 2 * np.abs(z) - [1, 0, 0]
+        across = np.hypot(z[0], z[1])
+        expected = max(across - 0.5, across * abs(z[2]) / np.linalg.norm(z)) / 4
+        assert distance == pytest.approx(expected, rel=1e-6)
+    # Another function for distances than that of discs is none of these.
+    other = import_text(settings("formula_1 104;\nN 2;\ndelta_DE_function 2;"), "x.fract", formulas=folder)
+    assert "distance" not in str(other.scene["formula"])
