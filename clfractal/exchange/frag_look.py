@@ -35,6 +35,7 @@ DEFAULTS: Mapping[str, tuple[float, ...]] = {
     "CamLight": (1.0, 1.0, 1.0, 1.0),
     "CamLightMin": (0.0,),
     "Glow": (1.0, 1.0, 1.0, 0.0),
+    "GlowMax": (20.0,),
     "Fog": (0.0,),
     "HardShadow": (0.0,),
     "Reflection": (0.0,),
@@ -64,7 +65,6 @@ METHOD = frozenset(
             "ShowDepth",
             "DepthToAlpha",
             "DepthMagnitude",
-            "GlowMax",
         ),
         *(
             "QualityShadows",
@@ -83,6 +83,8 @@ _STOPS = 48
 _FARTHEST = 2.0
 """Distances of the orbit that colours are told for."""
 _USUAL = 0.1
+_USUAL_STEPS = 20
+_GLOW = 0.15
 
 
 @dataclass
@@ -166,7 +168,10 @@ def look_of(look: Look, camera: dict[str, Any], traps: bool) -> dict[str, Any]:
         found["renderer"]["ambient_occlusion"] = {"rays": 4}
     glow = look.numbers("Glow")
     if glow[3] > 0:
-        found["glow"] = {"color": look.shown(glow[:3]), "intensity": look.amount(min(glow[3], 1.0))}
+        # Theirs grows with the steps of rays that pass by, and is whole at `GlowMax` of them; ours is on the surface, too.
+        steps = min(_USUAL_STEPS / max(look.number("GlowMax"), 1.0), 1.0)
+        strength = _GLOW * look.amount(min(glow[3] * steps, 1.0))
+        found["glow"] = {"color": look.shown(glow[:3]), "intensity": round(strength, 6)}
     fog = look.number("Fog")
     if fog > 0:
         # Theirs weakens light by exp(-(fog^2 d)^2): ours is half gone at the same distance.
@@ -182,7 +187,8 @@ def look_of(look: Look, camera: dict[str, Any], traps: bool) -> dict[str, Any]:
     output: dict[str, Any] = {}
     if exposure > 0 and exposure != 1:
         output["exposure"] = round(min(max(math.log2(exposure) * _SRGB / look.gamma, -20), 20), 6)
-    if look.number("ToneMapping") == 4:
+    if look.number("ToneMapping") > 1:
+        # 2 to 5 are curves that bright light bends to white.
         output["tone"] = "reinhard"
     if output:
         found["output"] = output
