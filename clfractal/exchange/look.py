@@ -25,7 +25,7 @@ _LAMP_FACTOR = 100 / 24
 _LARGEST = 1e6
 _FACING = 0.75
 """The cosine at which a surface in the main light is as bright as theirs: at others ours change more slowly."""
-_STEPS = 15
+_STEPS = 8
 """Of theirs on a way to the surface, times their `DE_factor`: what glow grows with. It covers what is behind, ours adds."""
 _LEAST_GLOW = 1e-3
 _HALF = 0.5
@@ -308,7 +308,7 @@ def _glow(main: Section, camera: dict[str, Any], screen: Screen) -> dict[str, An
     intensity = main.number("glow_intensity", 0.2)
     if not main.flag("glow_enabled", True) or intensity <= 0:
         return None
-    amount = screen.amount(min(intensity * _STEPS / 512, 0.5))
+    amount = screen.amount(min(intensity * _STEPS / 512, 0.3))
     if amount < _LEAST_GLOW:
         return None
     return {"color": screen.color(outer), "intensity": amount, "width": 0.2 * _seen_height(camera)}

@@ -149,9 +149,9 @@ class TestScenes:
         assert "glow" not in single
         strong = imported("glow_intensity 15;\nglow_color_2 ffff 0 8000;").scene["glow"]
         assert strong["color"][:2] == [1, 0]
-        assert strong["intensity"] == pytest.approx((15 * 15 / 512) ** 2.2, rel=1e-4)
+        assert strong["intensity"] == pytest.approx((15 * 8 / 512) ** 2.2, rel=1e-4)
         most = imported(f"{CAMERA}\nglow_intensity 90;").scene["glow"]["intensity"]
-        assert most == pytest.approx(0.5**2.2, rel=1e-4)
+        assert most == pytest.approx(0.3**2.2, rel=1e-4)
         assert "glow" not in scene
 
     def test_background_is_what_is_seen_above_and_below(self) -> None:
