@@ -77,7 +77,12 @@ class Parameters:
         """A way to do something, as old files name it: `type2`, or a word of the texts' own names."""
         if word.startswith("type") and word[4:].isdecimal() and len(word) < 8:
             return float(int(word[4:]) - 1)
-        found = {number for name, number in self.choices.items() if name.endswith(f"_{word}")}
+        names = {name: number for name, number in self.choices.items() if name.endswith(f"_{word}")}
+        found = set(names.values())
+        if len(found) > 1:  # `multi_OrderOfXYZCl_zxy` is meant by `..._order_of_xyz zxy`
+            kinds = {name: name.split("_")[-2].removesuffix("Cl").lower() for name in names}
+            wanted = folded(key).lower()
+            found = {names[name] for name, kind in kinds.items() if kind in wanted}
         if len(found) != 1:
             raise FileError(f"must be a number, got {word[:40]!r}", self.section.where(key))
         return float(found.pop())

@@ -72,6 +72,9 @@ _RANK = {
 }
 
 
+_ALMOST_NOTHING = 1e-30
+
+
 class TooLargeError(Exception):
     """An expression is larger than our language takes."""
 
@@ -95,6 +98,9 @@ class Symbols:
         """
         if all(isinstance(part, float) for part in parts) and operation in FUNCTIONS:
             return float(FUNCTIONS[operation](*parts))
+        if operation == "/" and parts[1] == 0.0:
+            # Texts count on infinity, of which our language has none; what is divided by that is 0 in both.
+            parts = (parts[0], _ALMOST_NOTHING)
         simple = self._simple(operation, parts)
         return self._made(operation, parts) if simple is None else simple
 
