@@ -137,20 +137,21 @@ def object_records(scene: Scene, precision: Precision, grids_begin: int = 0) -> 
             "body": index,
             "glass": int(through) and (1 if clear else 2),
             "bends": bends,
-            "shot": int(is_shot(each)),
+            "shot": int(is_shot(each, material)),
             **_place(scene, each),
             **_phong_material(scene, each),
             **_sampled(radiance),
             "colored": int(_has_color(scene, each)),
             **(grids.fields(name, grids_begin) if isinstance(each, VolumeObject) else NO_GRID),
         }
-        for index, number, through, clear, bends, radiance, (name, each) in zip(
+        for index, number, through, clear, bends, radiance, material, (name, each) in zip(
             range(1, 1 + len(scene.objects)),
             numbers,
             glass,
             through_all,
             clear_bodies(scene),
             sampled_radiance(scene),
+            used_materials(scene)[1:],
             scene.objects.items(),
             strict=True,
         )

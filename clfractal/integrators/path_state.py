@@ -195,6 +195,7 @@ BENT = _struct(
     ("real", "medium", "and what it was in before the present interaction"),
     ("real", "crossed", "boundaries of the body since; below 0: it has come otherwise"),
     ("real", "body", "the number of the body at whose boundary it is, or 0"),
+    ("real", "answered", "whether light that comes over that boundary was sampled where it set out"),
     ("color", "awaited", "what one light brings through a clear body, if nothing is in the way of its rays"),
 )
 

@@ -1,4 +1,4 @@
-"""Clear bodies with smooth boundaries, through which lights are sampled (`bent_light.h`)."""
+"""Clear bodies with smooth or slightly rough boundaries, through which lights are sampled (`bent_light.h`)."""
 
 from __future__ import annotations
 
@@ -14,10 +14,13 @@ from clfractal.schema.shape import ObjectBase, Solid
 from clfractal.shading.maps import MappedMaterials
 from clfractal.shading.materials import used_materials
 
+ROUGHEST = 0.3
+"""Roughness above which paths find light through a boundary as well by chance."""
+
 
 def is_clear(material: PbrMaterial) -> bool:
-    """Whether light goes through a material as through a polished pane: at one angle, the same at all places and of
-    all colours, and without being scattered.
+    """Whether light goes through a material as through a polished or slightly rough pane: the same at all places and of
+    all colours, and without being scattered within.
     """
     if material.blend is not None:
         return False
@@ -26,9 +29,9 @@ def is_clear(material: PbrMaterial) -> bool:
         return False
     glass = material.transmission
     bare = material.coat.weight == 0 and material.fuzz.weight == 0 and material.thin_film.weight == 0
-    smooth = (
-        material.specular.roughness == 0 and material.subsurface.weight == 0 and material.base.metalness == 0
-    )
+    surface = material.specular
+    even = surface.roughness == 0 or (surface.roughness <= ROUGHEST and surface.anisotropy == 0)
+    smooth = even and material.subsurface.weight == 0 and material.base.metalness == 0
     clear: bool = glass.weight > 0 and glass.scatter == BLACK and glass.dispersion_scale == 0
     return clear and bare and smooth
 
@@ -38,9 +41,12 @@ def crossings(body: ObjectBase) -> int:
     return 2 if isinstance(body, Solid) else int(isinstance(body, PlaneObject | WaterObject))
 
 
-def is_shot(body: ObjectBase) -> bool:
-    """Whether chains through a body that is crossed twice are found by shooting rays: through all but round balls."""
-    return isinstance(body, Solid) and not (isinstance(body, SphereObject) and len(set(body.scale)) == 1)
+def is_shot(body: ObjectBase, material: PbrMaterial) -> bool:
+    """Whether chains through a body that is crossed twice are found by shooting rays: through all but smooth round
+    balls, since facets lead them out of the plane of both ends.
+    """
+    round_ball = isinstance(body, SphereObject) and len(set(body.scale)) == 1
+    return isinstance(body, Solid) and not (round_ball and material.specular.roughness == 0)
 
 
 def clear_bodies(scene: Scene) -> list[int]:
@@ -57,5 +63,5 @@ def clear_bodies(scene: Scene) -> list[int]:
 
 def has_shot_bodies(scene: Scene) -> bool:
     """Whether light is sampled through a body of which `is_shot` is true."""
-    rows = zip(clear_bodies(scene), scene.objects.values(), strict=True)
-    return any(over and is_shot(each) for over, each in rows)
+    rows = zip(clear_bodies(scene), scene.objects.values(), used_materials(scene)[1:], strict=True)
+    return any(over and is_shot(each, material) for over, each, material in rows)

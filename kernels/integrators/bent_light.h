@@ -1,10 +1,11 @@
-// Light that the smooth boundaries of a clear body bend on its way to an event: sampled through chains (`chains.h`), and weighed against what
-// paths find by chance by the power heuristic (Veach and Guibas 1995), so that none is lost and none counts twice.
+// Light that boundaries of a clear body bend, smooth or slightly rough ones, on its way to an event: sampled through chains (`chains.h`), and
+// weighed against what paths find by chance by the power heuristic (Veach and Guibas 1995), so that none is lost and none counts twice.
 //
 // A path is followed from its last event that is not on glass on (`bent`): if it then comes to a light over the boundaries of one body alone,
 // sampling could have found its way. How likely that is follows from the direction in which it set out, whose chain is followed, not searched:
 // facets of glass are never quite flat, so that no chain may lead to the very place that the path has come to, while its weight as a function
-// of the direction is the same for both. Its density is told as `light_at_end` and `emitter_share` expect it. All others keep all of their light.
+// of the direction, and of facets of rough boundaries, is the same for both. Its density is told as `light_at_end` and `emitter_share` expect
+// it. All others keep all of their light.
 #include "integrators/bent_ways.h"
 
 #define NO_CHAIN R(-1.0)   // of boundaries that have been crossed: nobody samples what comes
@@ -39,6 +40,27 @@ INLINE real past_density(vec from, vec direction, world w) {
         sum += pick(met, light_weight(w.lights + i, &from, w.tables) * light_density(w.lights + i, from, direction), R(0.0));
     }
     return sum;
+}
+
+// Whether light that chains bring is sampled by nothing else: what comes over their last boundary, which would sample lights, too, is left out
+// (`bent_answered`). Not beside lights on the set, which no chain leads to.
+INLINE int bent_owns(world w) { return w.settings->set_count == 0; }
+
+// The facets over which a path has gone that leaves a body's last boundary.
+INLINE facets facets_crossed(object_record o, real index, const bent *ways, const path *so_far, mask within, world w) {
+    facets f = facets_of(o, ways->from, w);
+    if (f.wide <= S(0.0)) return f;
+    const vec last = so_far->origin;
+    vec way = ways->toward;
+    if (crosses_twice(o)) {
+        const vec at = object_place(o, vec_along(ways->from, shape_crossed(o, &ways->from, &way, 0), way));
+        const vec inner = vec_normalize(vec_sub(last, at));
+        facet_met(&f, 0, chain_site_at(o, at).normal, way, inner, R(1.0) / index);
+        way = inner;
+    }
+    const int i = crosses_twice(o);
+    facet_met(&f, i, chain_site_at(o, last).normal, way, so_far->direction, i ? index : pick(within, index, R(1.0) / index));
+    return f;
 }
 
 // What paths have come to over the boundaries of a body which arrive `far` away at an object, or where nothing was met (`lands` tells which)
@@ -95,12 +117,15 @@ CALLED void bent_arrives_over(object_record o, const bent *ways, const path *so_
     // Over a level the path has crossed it where its last ray begins.
     const chain_end end = {vec_pick(past, straight, place), past, pick(past, (real)(REAL_LARGEST), distance)};
     const mask within = ~equal(ways->start, R(0.0));
-    const chain c = chain_followed(o, bent_index(o, w), &from, &ways->toward, &so_far->origin, within, &end);
+    const real index = bent_index(o, w);
+    const facets f = facets_crossed(o, index, ways, so_far, within, w);
+    const chain c = chain_followed(o, &f, index, &from, &ways->toward, &so_far->origin, within, &end);
     const real narrows = faces_bent(normal, straight, so_far->direction) / fmax(c.turns, CHAIN_TURNS);
     // The same shares of both follow from them where lights were chosen last.
-    const real told = ways->density * c.passes * narrows * of_last / fmax(chosen, R(1e-20));
-    known &= ~mask_of(c.fails) & less(R(0.0), chosen) & less(R(0.0), narrows);
-    with->density = pick(known, fmin(told, R(1e12)), with->density);
+    const real told = ways->density * c.chance * narrows * of_last / fmax(chosen, R(1e-20));
+    const mask sampled = known & ~mask_of(c.fails) & less(R(0.0), chosen) & less(R(0.0), narrows);
+    if (bent_owns(w)) with->density = pick(known, R(-1.0), with->density);
+    with->density = pick(sampled, fmin(told, R(1e12)), with->density);
 }
 
 CALLED void bent_arrives(const bent *ways, const path *so_far, path_state *with, real far, real object, mask lands, mask here, world w) {
@@ -116,7 +141,7 @@ CALLED void bent_arrives(const bent *ways, const path *so_far, path_state *with,
 INLINE mask bent_lands(bent *ways, const path_state *with, const interaction *found, mask lands, world w) {
     const mask of_set = of_the_set(found->object, w);
     mask samples = lands & ~(of_set & is_set_body(body_of_thing(found->object, w), w)) & equal(with->under, R(0.0));
-    mask open = equal(with->medium, R(0.0)), valid = lands & ~lands;
+    mask open = equal(with->medium, R(0.0)), valid = lands & ~lands, answered = valid;
     for (int i = 0; i < w.settings->object_count; ++i) {
         object_record o = w.objects + i;
         const real number = (real)((scalar)(i + 1));
@@ -129,10 +154,13 @@ INLINE mask bent_lands(bent *ways, const path_state *with, const interaction *fo
         const mask here = lands & on & (first | again);
         ways->body = pick(here, number, ways->body);
         valid |= here;
+        const mask last = equal(ways->crossed, (real)((scalar)(o->bends - 1))), begun = equal(ways->start, R(0.0)) | equal(ways->start, number);
+        if (bent_owns(w)) answered |= here & last & begun;
     }
     samples &= open;
     ways->body = pick(valid, ways->body, R(0.0));
     ways->crossed = pick(samples, R(0.0), pick(valid, ways->crossed, NO_CHAIN));
+    ways->answered = number_of(answered & valid);
     return samples;
 }
 
@@ -223,7 +251,7 @@ CALLED void packet_bends_light(stage s, const packet_pixels *at, int turn, world
     const mask on_path = mask_of(so_far.on_path) & equal(stop.halted, R(0.0));
     const color black = color_of(R(0.0), R(0.0), R(0.0));
     const vec nowhere = vec_of(R(0.0), R(0.0), R(0.0));
-    bent ways = {nowhere, nowhere, R(0.0), R(0.0), R(0.0), R(0.0), NO_CHAIN, R(0.0), black};
+    bent ways = {nowhere, nowhere, R(0.0), R(0.0), R(0.0), R(0.0), NO_CHAIN, R(0.0), R(0.0), black};
     real far = way_to_interaction(&found, arrived);
     if (s.bounce > 0) {
         STATE_RECALL(s, ways, STATE_BENT);

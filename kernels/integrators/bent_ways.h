@@ -38,8 +38,8 @@ typedef struct {
 NUMBERS_PICKED(bent_way)
 
 // Of a body of another shape: `shape_search.h`, or `plain_bodies.h`.
-CALLED mask shape_chain(object_record o, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted, vec *toward,
-                        real *chances);
+CALLED mask shape_chain(object_record o, const facets *f, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted,
+                        vec *toward, real *chances);
 
 // One way of those that have been found: by a number in (0, 1), and the sum of their weights so far.
 typedef struct {
@@ -80,6 +80,14 @@ INLINE vec bent_vantage(object_record o, vec from) {
         return vec_add(middle, vec_of_axes(o, within));
     }
     return is_ball(o) ? middle : vec_along(from, -vec_dot(vec_sub(from, middle), up), up);
+}
+
+// Facets of its boundary that are not known yet: the axis is never along the normals of most chains.
+INLINE facets facets_of(object_record o, vec from, world w) {
+    vec side, up;
+    make_frame(vec_normalize(vec_sub(vec_splat(o->middle), from)), &side, &up);
+    const vec across = vec_along(vec_scale(side, R(0.8)), R(0.6), up);
+    return no_facets(crosses_twice(o) ? across : vec_splat(o->own_x), facets_wide(o, w));
 }
 
 // How much narrower a place of a light is across the direction in which a chain arrives than as it was chosen, by its normal; 0 where one of
@@ -124,7 +132,7 @@ CALLED void chain_takes(object_record o, const bent_event *e, const bent_end *to
         weight *= weight;
         if (m->transmission_depth <= S(0.0)) b.through = color_mul(b.through, tint);
     }
-    b.chance = c->passes;
+    b.chance = c->chance;
     b.through = color_scale(b.through, c->passes * (real)(weight));
     b.narrows = shows_bent(to, c->leaves, w) * faces_bent(to->normal, to->straight, c->arrives) / fmax(c->turns, CHAIN_TURNS);
     b.lift = R(2.0) * LIFT_ERRORS * (real)(REAL_EPSILON) * ((real)(o->error_share) * fmax(largest_of(c->enters), largest_of(c->leaves)) + (real)(o->error));
@@ -147,6 +155,7 @@ CALLED void ball_ways(object_record o, const bent_event *e, const bent_end *to, 
     here &= less(b.radius, b.distance) & (to->end.far | less(square, vec_dot(last, last)));
     if (!any_lane(here)) return;
     const mask none = here & ~here;
+    const facets flat = no_facets(middle, S(0.0));
     real away, across, place = R(-1.0), low_place = place, low = R(0.0);
     real misses = ball_misses(&b, place, &away, &across);
     for (int step = 1; step <= BALL_STEPS; ++step) {
@@ -169,7 +178,7 @@ CALLED void ball_ways(object_record o, const bent_event *e, const bent_end *to, 
             const real root = second ? ball_crossing(&b, part, parts, next, at, found) : ball_crossing(&b, begin, begins, end, ends, found);
             ball_misses(&b, root, &away, &across);
             const vec toward = vec_normalize(vec_along(vec_scale(b.away, away), across, b.across));
-            const chain c = chain_followed(o, index, &e->from, &toward, &middle, none, &to->end);
+            const chain c = chain_followed(o, &flat, index, &e->from, &toward, &middle, none, &to->end);
             chain_takes(o, e, to, &c, &toward, R(1.0), none, found, chosen, w);
         }
         low_place = place;
@@ -185,16 +194,18 @@ CALLED void searched_ways(object_record o, const bent_event *e, const bent_end *
     const real index = bent_index(o, w);
     vec place = vec_splat(o->middle), toward;
     real chances;
+    facets f = facets_of(o, e->from, w);
+    if (f.wide > S(0.0)) facets_drawn(&f, seed);
     // Below it paths meet the light about as often by chance.
     const real least = pick(less(R(0.0), to->ray.density), R(0.3) / fmax(to->share * to->ray.density, (real)(REAL_SMALLEST)), R(0.0));
     if (is_shot(o)) {
-        here &= shape_chain(o, index, &e->from, &to->end, least, seed, here, &toward, &chances);
+        here &= shape_chain(o, &f, index, &e->from, &to->end, least, seed, here, &toward, &chances);
     } else {
-        here &= level_chain(o, index, &e->from, &to->straight, within, &to->end, least, seed, here, &place, &chances);
+        here &= level_chain(o, &f, index, &e->from, &to->straight, within, &to->end, least, seed, here, &place, &chances);
         toward = vec_normalize(vec_sub(place, e->from));
     }
     if (!any_lane(here)) return;
-    const chain c = chain_followed(o, index, &e->from, &toward, &place, within, &to->end);
+    const chain c = chain_followed(o, &f, index, &e->from, &toward, &place, within, &to->end);
     chain_takes(o, e, to, &c, &toward, chances, within, here, chosen, w);
 }
 

@@ -4,12 +4,6 @@
 #define CHAIN_BEGINNINGS 12
 #define CHAIN_TRIALS 512    // more of these at the most, until one leads to the same chain
 
-// A number of a stream of random ones in (0, 1).
-INLINE real next_random(bits *stream) {
-    *stream = hash_bits(*stream + 0x9e3779b9u);
-    return unit_of_bits(*stream);
-}
-
 // By two numbers that tell where a chain goes, and the determinant of what its end does; and from how many beginnings. Chains that are nearer
 // than `apart` and have determinants of one sign are one.
 typedef struct {

@@ -1,9 +1,12 @@
-// Chains: ways of light that the smooth boundaries of a clear body bend, from an event to a place of a light or in a light's direction.
+// Chains: ways of light that the boundaries of a clear body bend, smooth or slightly rough ones, from an event to a place of a light or in a
+// light's direction.
 //
 // A chain is told by the direction in which it leaves the event. It is followed over the boundaries with what changes where that direction
 // does (ray differentials, Igehy 1999). The determinant of what its end does is the generalized geometric term (Jakob and Marschner 2012). A
 // level (a plane, or water with waves) is crossed once, a ball or a body of another shape twice. Chains between two ends are found by
 // `ball_search.h`, `level_search.h` and `shape_search.h`.
+
+#include "integrators/chain_facets.h"
 
 #define CHAIN_TURNS R(1e-8)   // the least determinant: nearer to the edge of a caustic there is no chain
 
@@ -20,6 +23,7 @@ typedef struct {
     vec before, beyond;     // ... and their normals, away from the body
     vec arrives;            // in which direction it goes on there
     real passes;            // part of the light that goes through
+    real chance;            // with which a path goes through, over that with which its facets are drawn here
     real turns;             // the determinant: by angles across that direction, radians
 } chain;
 NUMBERS_PICKED(chain)
@@ -80,26 +84,48 @@ typedef struct {
 
 // Takes it on to a boundary at a distance, and over it: `index` is that of the matter it comes from over that beyond. The result says
 // whether it gets there, and through.
-INLINE mask beam_crosses(object_record o, chain_beam *b, real distance, vec place, real index, chain_site *site, real *passes) {
+INLINE mask beam_crosses(object_record o, const facets *f, int number, chain_beam *b, real distance, vec place, real index, chain_site *site,
+                         chain *found) {
     *site = chain_site_at(o, place);
-    const real over = vec_dot(b->way, site->normal), side = pick(less(over, R(0.0)), R(1.0), R(-1.0)), cosine = fabs(over);
+    const real over = vec_dot(b->way, site->normal), side = pick(less(over, R(0.0)), R(1.0), R(-1.0)), level = fabs(over);
     const vec n = vec_scale(site->normal, side);   // against the ray
+    vec m = n;
+    real cosine = level;
+    tilted tilt;
+    if (f->wide > S(0.0)) {
+        tilt = tilted_on(f, number, site->normal);
+        m = vec_scale(tilt.normal, side);
+        cosine = -vec_dot(b->way, m);
+    }
     const real square = R(1.0) - index * index * (R(1.0) - cosine * cosine);
-    const mask there = less(R(0.0), distance) & less(distance, R(1e15)) & less(R(1e-3), cosine) & less(R(1e-4), square);
-    const real far = pick(there, distance, R(0.0)), each = R(1.0) / fmax(cosine, R(1e-3));
+    mask there = less(R(0.0), distance) & less(distance, R(1e15)) & less(R(1e-3), level) & less(R(1e-3), cosine) & less(R(1e-4), square);
+    const real far = pick(there, distance, R(0.0)), each = R(1.0) / fmax(level, R(1e-3));
     const real beyond = sqrt(fmax(square, R(1e-4))), bend = index * cosine - beyond;
     const real slope = index - index * index * cosine / beyond;
     for (int i = 0; i < 2; ++i) {
         const vec reached = vec_along(b->moves[i], far, b->turns[i]);
         const vec moved = vec_along(reached, vec_dot(reached, n) * each, b->way);
-        const vec turned = vec_scale(chain_site_turns(o, site, moved), side);
-        const real flatter = -(vec_dot(b->turns[i], n) + vec_dot(b->way, turned));
+        vec turned = chain_site_turns(o, site, moved);
+        if (f->wide > S(0.0)) turned = tilted_turns(f, number, &tilt, site->normal, turned);
+        turned = vec_scale(turned, side);
+        const real flatter = -(vec_dot(b->turns[i], m) + vec_dot(b->way, turned));
         b->moves[i] = moved;
-        b->turns[i] = vec_along(vec_along(vec_scale(b->turns[i], index), bend, turned), slope * flatter, n);
+        b->turns[i] = vec_along(vec_along(vec_scale(b->turns[i], index), bend, turned), slope * flatter, m);
     }
     b->at = place;
-    b->way = vec_normalize(vec_along(vec_scale(b->way, index), bend, n));
-    *passes *= R(1.0) - fresnel_across(clamp(cosine, R(0.0), R(1.0)), R(1.0) / index);
+    b->way = vec_normalize(vec_along(vec_scale(b->way, index), bend, m));
+    real passes = R(1.0) - fresnel_across(clamp(cosine, R(0.0), R(1.0)), R(1.0) / index);
+    if (f->wide > S(0.0)) {
+        const real onward = -vec_dot(b->way, n);
+        there &= less(R(1e-3), onward);
+        // Paths draw what they see of facets, chains all of them.
+        passes *= fmax(cosine, R(1e-3)) * each / (vec_dot(m, n) * facets_hide(f, fmax(level, R(1e-3))));
+        found->chance *= passes;
+        passes /= facets_hide(f, fmax(onward, R(1e-3)));
+    } else {
+        found->chance *= passes;
+    }
+    found->passes *= passes;
     return there;
 }
 
@@ -132,8 +158,8 @@ INLINE beam_miss beam_misses(const chain_beam *b, const chain_end *end) {
 INLINE real miss_turns(const beam_miss *m) { return m->side_by[0] * m->up_by[1] - m->side_by[1] * m->up_by[0]; }
 
 // Brings a ray over a body's boundaries, as in `chain_followed`; the result says whether it gets through.
-INLINE mask chain_through(object_record o, real index, const vec *from, const vec *toward, const vec *place, mask within, chain_beam *b,
-                          chain *found) {
+INLINE mask chain_through(object_record o, const facets *f, real index, const vec *from, const vec *toward, const vec *place, mask within,
+                          chain_beam *b, chain *found) {
     chain_site site;
     const vec none = vec_of(R(0.0), R(0.0), R(0.0));
     *b = (chain_beam){*from, *toward, {none, none}, {none, none}};
@@ -150,8 +176,8 @@ INLINE mask chain_through(object_record o, real index, const vec *from, const ve
         distance = shape_crossed(o, from, &b->way, 0);
         at = object_place(o, vec_along(*from, distance, b->way));
     }
-    found->passes = R(1.0);
-    mask there = beam_crosses(o, b, distance, at, pick(within, index, R(1.0) / index), &site, &found->passes);
+    found->passes = found->chance = R(1.0);
+    mask there = beam_crosses(o, f, 0, b, distance, at, pick(within, index, R(1.0) / index), &site, found);
     found->enters = found->leaves = at;
     found->before = found->beyond = site.normal;
     if (crosses_twice(o)) {
@@ -162,7 +188,7 @@ INLINE mask chain_through(object_record o, real index, const vec *from, const ve
             distance = R(-2.0) * (real)(o->sides[0]) * vec_dot(b->way, site.normal);
             at = vec_along(at, distance, b->way);
         }
-        there &= beam_crosses(o, b, distance, at, index, &site, &found->passes);
+        there &= beam_crosses(o, f, 1, b, distance, at, index, &site, found);
         found->leaves = at;
         found->beyond = site.normal;
     }
@@ -171,10 +197,11 @@ INLINE mask chain_through(object_record o, real index, const vec *from, const ve
 }
 
 // Follows a ray over a body's boundaries: over a level at a `place` of it, from `within` the body or from outside.
-CALLED chain chain_followed(object_record o, real index, const vec *from, const vec *toward, const vec *place, mask within, const chain_end *end) {
+CALLED chain chain_followed(object_record o, const facets *f, real index, const vec *from, const vec *toward, const vec *place, mask within,
+                            const chain_end *end) {
     chain found;
     chain_beam b;
-    const mask there = chain_through(o, index, from, toward, place, within, &b, &found);
+    const mask there = chain_through(o, f, index, from, toward, place, within, &b, &found);
     const beam_miss missed = beam_misses(&b, end);
     found.turns = fabs(miss_turns(&missed));
     found.fails = number_of(~there | ~less(R(0.0), missed.left) | ~less(CHAIN_TURNS, found.turns));

@@ -9,7 +9,7 @@ INLINE chain_site shape_site_at(object_record o, vec place) {
     return (chain_site){none, R(0.0), R(0.0), R(0.0), R(1.0), none};
 }
 INLINE vec shape_site_turns(object_record o, const chain_site *s, vec way) { return vec_of(R(0.0), R(0.0), R(0.0)); }
-INLINE mask shape_chain(object_record o, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted, vec *toward,
-                        real *chances) {
+INLINE mask shape_chain(object_record o, const facets *f, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted,
+                        vec *toward, real *chances) {
     return wanted & ~wanted;
 }

@@ -64,6 +64,7 @@ CALLED void packet_scatters(stage s, const packet_pixels *at, int turn, world w)
         with.total = weight_of_all(e.from, e.own, w);
         const light_ray light = path_samples_light(s, at, &e, with.total, w, &with.awaited, &seeks.thing);
         with.awaited = color_mul(with.awaited, so_far.through);
+        if (KEEPS(s, STATE_BENT)) with.awaited = color_pick(bent_answered(s, light.toward, &found, &seeks), black, with.awaited);
         if (HAS(w, SOUGHT)) light_is_sought(&with, &seeks, scatters & ~edge.hidden);
         if (s.bounce > 0 && !HAS(w, CLOUDS)) with.awaited = limited(with.awaited, w.settings);
         shadow_ray.origin = e.from;

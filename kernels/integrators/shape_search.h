@@ -19,11 +19,11 @@ NUMBERS_PICKED(shape_way)
 
 INLINE real shape_wrong(const shape_way *w) { return w->missed.side * w->missed.side + w->missed.up * w->missed.up; }
 
-CALLED shape_way shape_way_of(object_record o, real index, const vec *from, const vec *toward, const chain_end *end) {
+CALLED shape_way shape_way_of(object_record o, const facets *f, real index, const vec *from, const vec *toward, const chain_end *end) {
     shape_way w;
     chain_beam b;
     chain unused;
-    const mask outside = less(R(1.0), R(0.0)), through = chain_through(o, index, from, toward, from, outside, &b, &unused);
+    const mask outside = less(R(1.0), R(0.0)), through = chain_through(o, f, index, from, toward, from, outside, &b, &unused);
     w.toward = *toward;
     w.missed = beam_misses(&b, end);
     w.there = number_of(through & less(R(0.0), w.missed.left));
@@ -32,13 +32,13 @@ CALLED shape_way shape_way_of(object_record o, real index, const vec *from, cons
 
 // From a direction on, which becomes a chain's way where the result says so. Steps that come no nearer are shortened; none is wider than the
 // body is seen.
-CALLED mask shape_searched(object_record o, real index, const vec *from, const vec *begin, const chain_end *end, real wide, shape_way *w,
-                           mask wanted) {
+CALLED mask shape_searched(object_record o, const facets *f, real index, const vec *from, const vec *begin, const chain_end *end, real wide,
+                           shape_way *w, mask wanted) {
     mask going = wanted;
     vec toward = *begin;
     real length = R(1.0), wrong = (real)(REAL_LARGEST);
     for (int step = 0; step <= SHAPE_STEPS; ++step) {
-        const shape_way next = shape_way_of(o, index, from, &toward, end);
+        const shape_way next = shape_way_of(o, f, index, from, &toward, end);
         const real misses = shape_wrong(&next);
         const mask nearer = going & mask_of(next.there) & less(misses, wrong);
         if (step == 0) {
@@ -77,8 +77,8 @@ INLINE vec shape_begins(object_record o, vec from, bits seed, int number) {
 
 // In which direction a chain sets out that goes through a body from outside, one of those that several beginnings lead to, and 1 over the
 // probability of having found it, as of `level_chain`.
-CALLED mask shape_chain(object_record o, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted, vec *toward,
-                        real *chances) {
+CALLED mask shape_chain(object_record o, const facets *f, real index, const vec *from, const chain_end *end, real least, bits seed, mask wanted,
+                        vec *toward, real *chances) {
     const vec offset = vec_sub(vec_splat(o->middle), *from);
     const scalar reach = fmax(fmax(o->sides[0], o->sides[1]), o->sides[2]);
     const real distance = sqrt(vec_dot(offset, offset)), wide = fmin((real)(reach) / fmax(distance, (real)(REAL_SMALLEST)), R(1.0));
@@ -105,7 +105,7 @@ CALLED mask shape_chain(object_record o, real index, const vec *from, const chai
         if (!any_lane(open)) break;
         shape_way w;
         const vec begin = shape_begins(o, *from, seed, i);
-        const mask fresh = shape_searched(o, index, from, &begin, end, wide, &w, open);
+        const mask fresh = shape_searched(o, f, index, from, &begin, end, wide, &w, open);
         const real u = vec_dot(w.toward, side), v = vec_dot(w.toward, up), turns = miss_turns(&w.missed);
         if (i < SHAPE_BEGINNINGS) {
             list_takes(&all, i, u, v, turns, apart, fresh);
