@@ -14,8 +14,8 @@ from clfractal.schema.shape import ObjectBase, Solid
 from clfractal.shading.maps import MappedMaterials
 from clfractal.shading.materials import used_materials
 
-ROUGHEST = 0.3
-"""Roughness above which paths find light through a boundary as well by chance."""
+ROUGHEST = 0.2
+"""Roughness above which light that is scattered between facets, which no chain leads to, is no longer next to nothing."""
 
 
 def is_clear(material: PbrMaterial) -> bool:

@@ -143,8 +143,10 @@ INLINE int bent_awaited(stage s) {
 // Whether light that comes from beyond a boundary was sampled where the path has set out: nothing samples it there once more.
 INLINE mask bent_answered(stage s, vec toward, const interaction *here, const sought *seeks) {
     bent ways;
-    const mask answered = mask_of(lanes_load(s.state + (s.at[STATE_BENT] + (int)(&ways.answered - (real *)&ways)) * s.stride));
-    return answered & ~less(R(0.0), vec_dot(toward, here->normal)) & less_equal(seeks->thing, R(0.0));
+    real answered;
+    // (Its lanes may be those of several packets.)
+    STATE_RECALL_NUMBERS(s, &answered, 1, state_part(s, STATE_BENT) + (int)(&ways.answered - (real *)&ways) * s.stride);
+    return mask_of(answered) & ~less(R(0.0), vec_dot(toward, here->normal)) & less_equal(seeks->thing, R(0.0));
 }
 
 // The lanes whose paths have not ended at an earlier interaction, or for which light that they sampled is awaited: nothing is left to do for
