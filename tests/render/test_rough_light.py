@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -130,7 +131,7 @@ def test_a_floor_under_a_rough_solid_has_the_suns_light_of_rays_through_it(
 def test_a_little_roughness_is_smooth(body: str) -> None:
     """A roughness of 0.01 spreads light less than a pixel: the same light on the whole."""
     view: dict[str, Any] = {"eye": [0, 0, -0.62], "target": [0, 0, -0.8], "fov": 135, "bounces": 0}
-    scene = pool([SUN], height=0.05) if body == "water" else under(BODIES[body], [SUN], **view)
+    scene = pool([SUN]) if body == "water" else under(BODIES[body], [SUN], **view)
     smooth, rough = (
         np.mean([light_of(each, 32, seed).mean() for seed in range(4)])
         for each in (scene, roughened(scene, 0.01))
@@ -141,7 +142,7 @@ def test_a_little_roughness_is_smooth(body: str) -> None:
 LAMP = {"type": "sphere", "position": [0.6, -0.8, 0.7], "radius": 0.4, "intensity": 5}
 OVER = {"type": "sphere", "position": [0.5, 0.4, 1.8], "radius": 0.3, "intensity": 8}
 SOLIDS_VIEW: dict[str, Any] = {"eye": [-0.1, 0, -0.6], "target": [-0.1001, 0, -0.8], "fov": 100, "bounces": 2}
-CASES = {
+CASES: dict[str, tuple[Callable[[], Scene], float]] = {
     "water": (lambda: pool([LAMP], bounces=1), 0.2),
     "waves": (lambda: pool([LAMP], bounces=1, height=0.12), 0.1),
     "ball": (lambda: under(BALL, [OVER], **SOLIDS_VIEW), 0.1),
