@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from clfractal.elements.shapes.box import BoxObject
 from clfractal.elements.shapes.plane import PlaneObject
 from clfractal.elements.shapes.sphere import SphereObject
 from clfractal.scene.light_paths import PathLighting
@@ -41,6 +42,16 @@ def crossings(body: ObjectBase) -> int:
     return 2 if isinstance(body, Solid) else int(isinstance(body, PlaneObject | WaterObject))
 
 
+def is_found(body: ObjectBase, material: PbrMaterial) -> bool:
+    """Whether chains have less noise than chance: over rough boundaries where these are flat, since facets tear the
+    chains of curved ones apart.
+    """
+    level = isinstance(body, PlaneObject | BoxObject) or (
+        isinstance(body, WaterObject) and body.waves.height == 0
+    )
+    return material.specular.roughness == 0 or level
+
+
 def is_shot(body: ObjectBase, material: PbrMaterial) -> bool:
     """Whether chains through a body that is crossed twice are found by shooting rays: through all but smooth round
     balls, since facets lead them out of the plane of both ends.
@@ -56,7 +67,9 @@ def clear_bodies(scene: Scene) -> list[int]:
         return none
     cut = {name for plane in scene.cut_planes for name in plane.cut_objects}
     return [
-        crossings(each) if name not in scene.joined and name not in cut and is_clear(material) else 0
+        crossings(each)
+        if name not in scene.joined and name not in cut and is_clear(material) and is_found(each, material)
+        else 0
         for (name, each), material in zip(scene.objects.items(), used_materials(scene)[1:], strict=True)
     ]
 
