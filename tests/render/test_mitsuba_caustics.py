@@ -14,7 +14,7 @@ from tests.render.mitsuba import Floats, assert_alike, by_mitsuba, by_us
 
 pytestmark = pytest.mark.light
 
-SIZE, SAMPLES, THEIR_SAMPLES, SEEDS, REGIONS = 24, 64, 384, 5, 3
+SIZE, SAMPLES, THEIR_SAMPLES, SEEDS, REGIONS = 24, 256, 1536, 5, 3
 FOV, BOUNCES, ALBEDO = 36.0, 8, 0.8
 BLACK = {"top": [0, 0, 0], "bottom": [0, 0, 0]}
 WHITE: dict[str, Any] = {"base": {"color": [ALBEDO] * 3}, "specular": {"weight": 0}}
