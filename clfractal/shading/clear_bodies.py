@@ -1,4 +1,4 @@
-"""Clear bodies with smooth or slightly rough boundaries, through which lights are sampled (`bent_light.h`)."""
+"""Clear bodies with smooth or nearly smooth boundaries, through which lights are sampled (`bent_light.h`)."""
 
 from __future__ import annotations
 
