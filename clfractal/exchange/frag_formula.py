@@ -1,4 +1,4 @@
-"""Writes a fragment's distance as a formula of ours: what its orbit does, what it carries, and the distance behind it."""
+"""Writes a fragment's distance as a formula of ours: its orbit, what that carries, the distance behind it."""
 
 from __future__ import annotations
 

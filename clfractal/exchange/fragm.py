@@ -1,4 +1,4 @@
-"""A fragment of Fragmentarium or FragM as a scene, with a line for everything in it that was not taken over."""
+"""A fragment of Fragmentarium or FragM as a scene, with a line for all in it that was not taken over."""
 
 from __future__ import annotations
 

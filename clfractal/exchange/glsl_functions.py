@@ -1,4 +1,4 @@
-"""The functions of GLSL, and those that fragments find in the files they include, by operations of our language."""
+"""The functions of GLSL, and those that fragments include, by operations of our language."""
 
 from __future__ import annotations
 

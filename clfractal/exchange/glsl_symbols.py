@@ -1,4 +1,4 @@
-"""Values of a fragment's code: numbers and conditions as expressions, vectors, matrices and arrays of them."""
+"""Values of a fragment's code: numbers and conditions as expressions, vectors, matrices, arrays of them."""
 
 from __future__ import annotations
 

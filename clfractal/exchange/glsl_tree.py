@@ -1,4 +1,4 @@
-"""What a fragment's code is made of: expressions, statements, functions, and numbers that the user may choose."""
+"""What a fragment's code is made of: expressions, statements, functions, numbers that the user chooses."""
 
 from __future__ import annotations
 
