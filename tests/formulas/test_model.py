@@ -29,7 +29,7 @@ from tests.formulas.opencl_batch import at_points, batch_text, formula_kernels
 from tests.formulas.orbits import FAR, ORBITS, STEPS, points_of, start_at
 from tests.formulas.rounding import spread
 from tests.small_kernels import Floats, SmallKernels
-from tests.variants import one_of
+from tests.variants import every, one_of
 
 PLAIN: dict[str, Any] = {
     "variables": ["x", "y", "z"],
@@ -377,7 +377,7 @@ def oracle(chain: Chain, at: Floats, base: Any, steps: int = STEPS) -> Floats:
 
 
 @pytest.mark.parametrize("precision", one_of("float32", "float64"))
-@pytest.mark.parametrize("name", LIVE)
+@pytest.mark.parametrize("name", every(2, LIVE))
 def test_every_value_of_the_library(name: str, precision: Precision) -> None:
     check_usable(precision)
     unit = float(np.finfo(precision).eps)

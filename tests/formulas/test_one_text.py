@@ -24,7 +24,7 @@ from clfractal.formulas.together import write_together
 from clfractal.geometry.solids import Body
 from clfractal.integrators.points import distances, nearest
 from clfractal.scene.load import load_scene
-from tests.variants import combinations
+from tests.variants import combinations, every
 
 SINGLE = [name for name in catalog.names() if not catalog.is_chain(name)]
 WITH_PARAMETERS = [name for name in SINGLE if catalog.load(name).parameters]
@@ -100,7 +100,7 @@ def places(parameter: Parameter) -> list[float]:
     return sorted({round(v) for v in found} if parameter.type == "int" else {*found, parameter.default})
 
 
-@pytest.mark.parametrize(("name", "parameter"), SLIDERS, ids=[f"{n}-{p.name}" for n, p in SLIDERS])
+@pytest.mark.parametrize(("name", "parameter"), every(2, SLIDERS), ids=[f"{n}-{p.name}" for n, p in SLIDERS])
 def test_a_slider_keeps_the_text(name: str, parameter: Parameter) -> None:
     chains = chains_of([{"name": name, "parameters": {parameter.name: value}} for value in places(parameter)])
     assert len(chains) > 1

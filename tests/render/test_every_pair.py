@@ -23,6 +23,7 @@ from tests.features import APART, CUT_PLANE, OF_MEDIA, SURFACE, VOLUME, Values, 
 from tests.gpu.pairs import covering
 from tests.portability.pictures import FOLDER
 from tests.render.shots import CHANNELS, plan_of, render_planned, shoot, stacked
+from tests.variants import every
 
 SIZE = (44, 26)  # two tiles, neither of them whole
 PLAIN: dict[str, Any] = {
@@ -113,7 +114,7 @@ def same(framebuffer: Framebuffer, other: Framebuffer, name: str) -> bool:
 
 @pytest.mark.parametrize(
     ("kind", "chosen"),
-    CHOICES,
+    every(2, CHOICES),
     ids=[" ".join(filter(None, (kind, *each.values()))) for kind, each in CHOICES],
 )
 def test_a_pair(
