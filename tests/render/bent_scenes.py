@@ -5,8 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+import pytest
 
 import clfractal
+from clfractal.integrators import state, waves
 from clfractal.scene.model import Scene
 
 INDEX, GLASS, ALBEDO = 1.33, 1.5, 0.8
@@ -45,6 +47,21 @@ def light_of(scene: Scene, samples: int, seed: int = 0) -> np.ndarray[Any, np.dt
     """The picture's green, shape (height, width)."""
     renderer = scene.surface.model_copy(update={"samples": samples, "seed": seed})
     return np.asarray(clfractal.render(scene.model_copy(update={"renderer": renderer}))["G"], np.float64)
+
+
+def assert_as_by_chance(
+    scene: Scene, samples: int, monkeypatch: pytest.MonkeyPatch, tolerance: float = 0.005
+) -> tuple[float, float]:
+    """The same light on the whole as paths find with four times the samples; gives the variances of both pictures."""
+    seeds = range(5)
+    found = np.array([light_of(scene, samples, seed) for seed in seeds])
+    for each in (waves, state):
+        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
+    by_chance = np.array([light_of(scene, 4 * samples, seed) for seed in seeds])
+    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
+    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
+    assert abs(one.mean() - other.mean()) < tolerance * other.mean() + 3 * error
+    return float(found.var(axis=0, ddof=1).mean()), float(by_chance.var(axis=0, ddof=1).mean())
 
 
 def transmittance(cosine: float) -> float:

@@ -7,8 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.integrators import state, waves
-from tests.render.bent_scenes import ALBEDO, GLASS, INDEX, light_of, pool, transmittance, under_ball
+from tests.render.bent_scenes import (
+    ALBEDO,
+    GLASS,
+    INDEX,
+    assert_as_by_chance,
+    light_of,
+    pool,
+    transmittance,
+    under_ball,
+)
 from tests.variants import one_of
 
 TOWARD = np.array([0.5, 0.3, -1.0])
@@ -89,19 +97,13 @@ CASES: dict[str, tuple[list[dict[str, Any]], float, dict[str, Any]]] = {
 def test_no_light_is_lost_or_counted_twice(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Lights that are large enough for paths to find them by chance: the same light on the whole, and less noise."""
     lights, eye, objects = CASES[case]
-    scene, seeds = pool(lights, eye, 12, **objects), range(5)
-    found = np.array([light_of(scene, 32, seed) for seed in seeds])
-    for each in (waves, state):
-        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
-    by_chance = np.array([light_of(scene, 128, seed) for seed in seeds])
-    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
-    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
-    assert abs(one.mean() - other.mean()) < 0.01 * other.mean() + 3 * error
+    scene = pool(lights, eye, 12, **objects)
+    own, chance = assert_as_by_chance(scene, 32, monkeypatch, 0.01)
     # With a quarter of the samples; a lamp as wide as that under water, and those over waves, are met by
     # chance as well as by chains.
     if "height" not in objects:
         worth = 4.5 if case == "sunk" else 1.0
-        assert found.var(axis=0, ddof=1).mean() < worth * by_chance.var(axis=0, ddof=1).mean()
+        assert own < worth * chance
 
 
 @pytest.mark.light

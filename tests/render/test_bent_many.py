@@ -7,11 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.integrators import state, waves
 from clfractal.scene.model import Scene
 from clfractal.shading.emitter_tree import shining_of
 from clfractal.shading.light_tree import lamps_of
-from tests.render.bent_scenes import ALBEDO, INDEX, light_of, pool, transmittance, under_ball
+from tests.render.bent_scenes import (
+    ALBEDO,
+    INDEX,
+    assert_as_by_chance,
+    light_of,
+    pool,
+    transmittance,
+    under_ball,
+)
 
 MANY = 20
 PLACES = [
@@ -64,13 +71,6 @@ def test_no_light_of_many_lamps_is_lost_or_counted_twice(many: str, monkeypatch:
     """The same light as by chance on the whole, and less noise."""
     scene = under_many(LAMPS, 8) if many == "lamps" else under_many([], 8, **BALLS)
     assert len(lamps_of(scene).nodes) + len(shining_of(scene).nodes) > 0
-    seeds = range(5)
-    found = np.array([light_of(scene, 64, seed) for seed in seeds])
-    for each in (waves, state):
-        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
-    by_chance = np.array([light_of(scene, 256, seed) for seed in seeds])
-    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
-    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
-    assert abs(one.mean() - other.mean()) < 0.005 * other.mean() + 3 * error
+    own, chance = assert_as_by_chance(scene, 64, monkeypatch)
     # At equal samples.
-    assert found.var(axis=0, ddof=1).mean() / 4 < by_chance.var(axis=0, ddof=1).mean()
+    assert own / 4 < chance

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.integrators import state, waves
 from clfractal.scene.model import Scene
 from clfractal.schema.shape import Solid
 from tests.render.bent_rays import SHAPES, Floats, bent, marched, normals, under
-from tests.render.bent_scenes import ALBEDO, GLASS, light_of
+from tests.render.bent_scenes import ALBEDO, GLASS, assert_as_by_chance, light_of
 from tests.variants import one_of
 
 STRAIGHT = (1 - ((GLASS - 1) / (GLASS + 1)) ** 2) ** 2
@@ -143,16 +142,9 @@ def test_no_light_is_lost_or_counted_twice(case: str, monkeypatch: pytest.Monkey
     shape, lamp = CASES[case]
     view: dict[str, Any] = {"eye": [0, -1.5, 0.2], "target": [-0.15, -0.1, -0.8]}
     scene = under(SHAPES[shape], [{"type": "sphere", "radius": 0.5, "intensity": 8, **lamp}], 16, **view)
-    seeds = range(5)
-    found = np.array([light_of(scene, 48, seed) for seed in seeds])
-    for each in (waves, state):
-        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
-    by_chance = np.array([light_of(scene, 192, seed) for seed in seeds])
-    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
-    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
-    assert abs(one.mean() - other.mean()) < 0.005 * other.mean() + 3 * error
+    own, chance = assert_as_by_chance(scene, 48, monkeypatch)
     # At equal samples.
-    assert found.var(axis=0, ddof=1).mean() / 4 < by_chance.var(axis=0, ddof=1).mean()
+    assert own / 4 < chance
 
 
 @pytest.mark.light

@@ -8,12 +8,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from clfractal.integrators import state, waves
 from clfractal.scene.model import Scene
 from clfractal.schema.shape import Solid
 from clfractal.shading.clear_bodies import ROUGHEST, clear_bodies
 from tests.render.bent_rays import SHAPES, Floats, bent, marched, normals, under
-from tests.render.bent_scenes import ALBEDO, GLASS, INDEX, light_of, pool
+from tests.render.bent_scenes import ALBEDO, GLASS, INDEX, assert_as_by_chance, light_of, pool
 from tests.variants import one_of
 
 BOX = SHAPES["box"]
@@ -150,16 +149,10 @@ CASES: dict[str, tuple[Callable[[], Scene], float]] = {
 def test_no_light_is_lost_or_counted_twice(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """A lamp that paths find by chance, too, within so many bounces: the same light on the whole, and less noise."""
     make, roughness = CASES[case]
-    scene, seeds = roughened(make(), roughness), range(5)
-    found = np.array([light_of(scene, 64, seed) for seed in seeds])
-    for each in (waves, state):
-        monkeypatch.setattr(each, "has_bent_light", lambda scene: False)
-    by_chance = np.array([light_of(scene, 256, seed) for seed in seeds])
-    one, other = found.mean(axis=(1, 2)), by_chance.mean(axis=(1, 2))
-    error = np.sqrt((one.var(ddof=1) + other.var(ddof=1)) / len(seeds))
-    assert abs(one.mean() - other.mean()) < 0.005 * other.mean() + 3 * error
+    scene = roughened(make(), roughness)
+    own, chance = assert_as_by_chance(scene, 64, monkeypatch)
     # At equal samples.
-    assert found.var(axis=0, ddof=1).mean() / 4 < by_chance.var(axis=0, ddof=1).mean()
+    assert own / 4 < chance
 
 
 @pytest.mark.light
