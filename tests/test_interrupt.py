@@ -21,7 +21,8 @@ from clfractal.cli import interrupt as interrupt_module
 from clfractal.cli import shell as shell_module
 from clfractal.cli.shell import Shell
 from clfractal.cli.unfinished import Unfinished
-from clfractal.device.select import choose, sees_host_writes
+from clfractal.device.quirks import sees_host_writes
+from clfractal.device.select import choose
 from clfractal.engine.prepare import prepare
 from clfractal.scene.load import load_scene
 from tests.interrupts import planes

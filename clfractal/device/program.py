@@ -17,7 +17,12 @@ import pyopencl as cl
 
 from clfractal.device import activity, cache, compiler, driver_files, drivers_folder, isolate
 from clfractal.device.compiler import BuildFailureError, Warm
-from clfractal.device.select import Device, cannot_run_optimised_code, loses_copies_when_unrolling
+from clfractal.device.quirks import (
+    cannot_run_optimised_code,
+    loses_copies_when_unrolling,
+    vectorises_what_is_wide,
+)
+from clfractal.device.select import Device
 from clfractal.device.source import SourceMap
 from clfractal.device.structs import Precision
 from clfractal.errors import FileError, NotReady, Stopped, Where
@@ -145,6 +150,8 @@ def _as_compiled(device: Device, text: str, flags: Sequence[str]) -> tuple[str, 
         text, flags = "#define INTERPRETED\n" + text, [*flags, "-cl-opt-disable"]
     if loses_copies_when_unrolling(device.info):
         text = "#define COUNTS_AT_RUN_TIME\n" + text
+    if vectorises_what_is_wide(device.info):
+        text = "#define __kernel __kernel __attribute__((intel_vec_len_hint(1)))\n" + text
     return text, flags
 
 

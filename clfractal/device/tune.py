@@ -11,7 +11,8 @@ from dataclasses import asdict, dataclass
 from typing import Any, TypeVar
 
 from clfractal.device import activity, cache, isolate
-from clfractal.device.select import Device, compiles_packets_slowly, has_float64, vectorises_across_work_items
+from clfractal.device.quirks import compiles_packets_slowly, vectorises_across_work_items
+from clfractal.device.select import Device, has_float64
 from clfractal.device.structs import Precision
 from clfractal.errors import (
     STATUS_BAD_INPUT,

@@ -13,7 +13,8 @@ import numpy as np
 import numpy.typing as npt
 import pyopencl as cl
 
-from clfractal.device.select import Device, sees_host_writes
+from clfractal.device.quirks import sees_host_writes
+from clfractal.device.select import Device
 
 CANCELLED = "cancelled"
 """The field of a struct that kernels read."""

@@ -1,7 +1,7 @@
 // Built-in functions as operations of the compiler, so that kernels call nothing of a driver's library.
 
 // Every helper is meant to vanish into its caller: a call per packet operation would cost more than the operation.
-// (INTERPRETED is defined for a driver that cannot: see `cannot_run_optimised_code` in clfractal/device/select.py.)
+// (INTERPRETED is defined for a driver that cannot: see `cannot_run_optimised_code` in clfractal/device/quirks.py.)
 #ifdef INTERPRETED
 #define INLINE static inline
 #else

@@ -129,7 +129,7 @@ INLINE real bounded(real a, real low, real high) { return least(most(low, a), hi
 
 // The count of a loop whose body copies structs. Where a driver loses such copies when it unrolls the loop, the count is one that
 // its compiler cannot know. (COUNTS_AT_RUN_TIME is defined for such a driver: see `loses_copies_when_unrolling` in
-// clfractal/device/select.py. The number of dimensions is 1, 2 or 3.)
+// clfractal/device/quirks.py. The number of dimensions is 1, 2 or 3.)
 #ifdef COUNTS_AT_RUN_TIME
 #define TURNS(count) ((count) + (int)(get_work_dim() >> 2))
 #else

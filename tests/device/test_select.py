@@ -15,7 +15,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from clfractal.device import cache, choice, select, unknown_cpu
+from clfractal.device import cache, choice, quirks, select, unknown_cpu
 from clfractal.device.choice import choose_all
 from clfractal.device.select import (
     ENVIRONMENT_VARIABLE,
@@ -193,10 +193,8 @@ def test_no_device_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 def test_quirks() -> None:
     assert select.is_simulator(_OCLGRIND)
     assert not any(select.is_simulator(info) for info in (_POCL, _INTEL, _GPU))
-    assert [info for info in (_POCL, _INTEL, _GPU) if select.vectorises_across_work_items(info)] == [
-        _INTEL,
-        _GPU,
-    ]
+    assert [info for info in (_POCL, _INTEL, _GPU) if quirks.vectorises_across_work_items(info)] == [_GPU]
+    assert [info for info in (_POCL, _INTEL, _GPU) if quirks.vectorises_what_is_wide(info)] == [_INTEL]
     assert not select.has_float64(dataclasses.replace(_POCL, has_float64=False))
 
 

@@ -17,7 +17,8 @@ from clfractal.cli.bench import HAST
 from clfractal.device import isolate, launch, program
 from clfractal.device.launch import Pace
 from clfractal.device.orbit import ORBIT
-from clfractal.device.select import Device, sees_host_writes
+from clfractal.device.quirks import sees_host_writes
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 from clfractal.device.watched import CANCELLED, Watched, is_watched
 from clfractal.engine.job import Job

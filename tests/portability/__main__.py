@@ -35,7 +35,7 @@ from tests.portability.implementations import (
 )
 from tests.portability.pictures import PARTS
 
-# Of one process: the longest takes nine minutes on two idle cores (`Implementation.minutes`), and more beside other work.
+# Of one process: the longest takes three minutes on two idle cores (`Implementation.minutes`), and more beside other work.
 _TIMEOUT_S = 1500
 _TELLING = threading.Lock()
 

@@ -143,7 +143,7 @@ def _of_trixie(icd: str) -> Callable[[], str]:
 IMPLEMENTATIONS = (
     Implementation("pocl-wheel", "pthread", _wheel),
     Implementation("pocl-debian", "debian", _debian_pocl),
-    Implementation("intel", "Intel(R) OpenCL", _intel, minutes=9),
+    Implementation("intel", "Intel(R) OpenCL", _intel, minutes=2),
     Implementation("pocl-trixie", "Portable", _of_trixie("pocl.icd"), root=_trixie),
     # Of the devices that Mesa has, the processor.
     Implementation(

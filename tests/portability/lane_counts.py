@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from clfractal.device import tune
-from clfractal.device.select import Device, compiles_packets_slowly
+from clfractal.device.quirks import compiles_packets_slowly
+from clfractal.device.select import Device
 from clfractal.device.structs import Precision
 
 

@@ -157,7 +157,7 @@ FOLDER = Path(__file__).parent
 """Where the grid is that objects show."""
 SIZE, TINY_SIZE = (96, 72), (12, 8)
 # Processes that share a kind's pictures: one for surfaces, which share the programs that know no formula, and two for the
-# others, of which Intel's compiler takes minutes. The simulator's checker of memory takes a second picture's for the first
+# others. The simulator's checker of memory takes a second picture's for the first
 # one's.
 PARTS = {"full": 3, "brief": 3, "tiny": 4}
 
