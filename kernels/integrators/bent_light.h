@@ -42,10 +42,6 @@ INLINE real past_density(vec from, vec direction, world w) {
     return sum;
 }
 
-// Whether light that chains bring is sampled by nothing else: what comes over their last boundary, which would sample lights, too, is left out
-// (`bent_answered`). Not beside lights on the set, which no chain leads to.
-INLINE int bent_owns(world w) { return w.settings->set_count == 0; }
-
 // The facets over which a path has gone that leaves a body's last boundary.
 INLINE facets facets_crossed(object_record o, real index, const bent *ways, const path *so_far, mask within, world w) {
     facets f = facets_of(o, ways->from, w);
@@ -124,8 +120,8 @@ CALLED void bent_arrives_over(object_record o, const bent *ways, const path *so_
     // The same shares of both follow from them where lights were chosen last.
     const real told = ways->density * c.chance * narrows * of_last / fmax(chosen, R(1e-20));
     const mask sampled = known & ~mask_of(c.fails) & less(R(0.0), chosen) & less(R(0.0), narrows);
-    if (bent_owns(w)) with->density = pick(known, R(-1.0), with->density);
-    with->density = pick(sampled, fmin(told, R(1e12)), with->density);
+    // (Their last boundary, which would sample lights, too, samples none: `bent_answered`.)
+    with->density = pick(sampled, fmin(told, R(1e12)), pick(known, R(-1.0), with->density));
 }
 
 CALLED void bent_arrives(const bent *ways, const path *so_far, path_state *with, real far, real object, mask lands, mask here, world w) {
@@ -155,7 +151,7 @@ INLINE mask bent_lands(bent *ways, const path_state *with, const interaction *fo
         ways->body = pick(here, number, ways->body);
         valid |= here;
         const mask last = equal(ways->crossed, (real)((scalar)(o->bends - 1))), begun = equal(ways->start, R(0.0)) | equal(ways->start, number);
-        if (bent_owns(w)) answered |= here & last & begun;
+        answered |= here & last & begun;
     }
     samples &= open;
     ways->body = pick(valid, ways->body, R(0.0));
@@ -202,7 +198,7 @@ INLINE void bent_samples(stage s, const packet_pixels *at, int turn, bent *ways,
     real numbers[LIGHT_SAMPLE_NUMBERS];
     path_light_numbers(s, at, w, numbers);
     choosing c = choose_light(e.point, e.from, e.normal, e.own, numbers, weight_of_all(e.from, e.own, w), w);
-    mask wanted = samples & ~equal(c.number, LIGHT_OF_SET) & ~c.found.unblocked & equal(c.found.sought, R(0.0));
+    mask wanted = samples & ~c.found.unblocked & equal(c.found.sought, R(0.0));
     const bent_event sampled = {e.from, e.normal, with->medium, wanted};
     const bits seed = pixel_seed(at->columns, at->rows, (uint)w.settings->seed, PURPOSE_CHAIN + NEXT_BOUNCE * (uint)s.bounce);
     bits stream = hash_bits(seed + (bits)((uint)s.sample * 0x85ebca6bu));

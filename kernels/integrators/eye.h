@@ -146,7 +146,7 @@ INLINE mask bent_answered(stage s, vec toward, const interaction *here, const so
     real answered;
     // (Its lanes may be those of several packets.)
     STATE_RECALL_NUMBERS(s, &answered, 1, state_part(s, STATE_BENT) + (int)(&ways.answered - (real *)&ways) * s.stride);
-    return mask_of(answered) & ~less(R(0.0), vec_dot(toward, here->normal)) & less_equal(seeks->thing, R(0.0));
+    return mask_of(answered) & ~less(R(0.0), vec_dot(toward, here->normal)) & equal(seeks->thing, R(0.0));
 }
 
 // The lanes whose paths have not ended at an earlier interaction, or for which light that they sampled is awaited: nothing is left to do for

@@ -58,13 +58,15 @@ INLINE real power_share(real own, real other) {
     return square / fmax(square + other * other, (real)(REAL_SMALLEST));
 }
 
+#define NEVER_BENT R(-1.0)   // of one to which no chain through glass leads
+
 // A light that was sampled: the ray to it, and the probability of having chosen it.
 typedef struct {
     light_ray ray;
     real share;            // of all lights, that this one is chosen
     real reckoned;         // a factor on the density with which both ways to find it reckon
     mask both, unblocked;  // whether a path meets it by chance, too; whether nothing can be in its way
-    real sought;           // of one whose light has to be looked up: 1 + the number of that thing; its own `light` is 1, and `far` unknown
+    real sought;           // of one whose light has to be looked up: 1 + the number of that thing; its own `light` is 1, and `far` unknown; or `NEVER_BENT`
 } sampled_light;
 
 // What is chosen of lights that have no records: the numbers of such choices.

@@ -21,6 +21,7 @@ CALLED void sample_set_light(choosing *c, const real *numbers, world w) {
     r.density = density / pick(shines, choice.weight, R(1.0));
     takes(c, here, r, weight);
     c->number = pick(here, LIGHT_OF_SET, c->number);
+    c->found.sought = pick(here, NEVER_BENT, c->found.sought);
     c->found.reckoned = pick(here & shines, choice.weight, c->found.reckoned);
     c->found.both |= here;
     c->found.unblocked |= here & ~ball.shadow;

@@ -74,3 +74,25 @@ def test_no_light_of_many_lamps_is_lost_or_counted_twice(many: str, monkeypatch:
     own, chance = assert_as_by_chance(scene, 64, monkeypatch)
     # At equal samples.
     assert own / 4 < chance
+
+
+def test_beside_lights_on_the_set_no_light_is_counted_twice() -> None:
+    """Very weak ones change nothing: they are left to chance behind glass, and chains find all others as without them."""
+    lamp = {"type": "point", "falloff": "inverse_square", "position": [1.8, 0, 2], "intensity": 2}
+    weak = {
+        "type": "set",
+        "trap": {"shape": "plane", "center": [0, 0, 0]},
+        "threshold": 0.4,
+        "count": 40,
+        "radius": 0.05,
+        "intensity": 1e-6,
+    }
+    # A ball of radius 1 at the origin, and one of glass beside it, over the floor.
+    scene = under_many([], 6).model_dump(mode="json", exclude_unset=True)
+    scene["formula"] = {"name": "quaternion_julia", "iterations": 6, "julia": [0, 0, 0, 0]}
+    scene["objects"]["ball"]["position"] = [1.8, 0, 0]
+    scene["camera"] |= {"position": [1.8, -1.5, 0], "target": [1.8, 0, -0.8], "fov": 10}
+    found, alone = (
+        light_of(Scene.model_validate({**scene, "lights": lights}), 32) for lights in ([lamp, weak], [lamp])
+    )
+    np.testing.assert_allclose(found.mean(), alone.mean(), rtol=0.003)

@@ -116,7 +116,7 @@ def test_parts_are_as_objects(case: str, precision: str) -> None:
 def test_a_white_furnace_stays_white(own: str) -> None:
     """A white body and a clear one that overlap, under a white sky, are the sky."""
     other = "clear" if own == "white" else "white"
-    found = colors_of(scene(own, (BESIDE, 0.8, other), background=GREY, bounces=96), 256)
+    found = colors_of(scene(own, (BESIDE, 0.8, other), background=GREY, bounces=96), 1024)
     assert abs(found.mean() - 1) < 0.002
     blocks = found.reshape(8, 6, 8, 6, 3).mean(axis=(1, 3, 4))
     assert np.abs(blocks - 1).max() < 0.01
