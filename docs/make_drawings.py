@@ -345,6 +345,7 @@ _BESIDE = {
     "march_points": ("look_at_points",),
     "scatter_paths": ("scatter_costly", "bend_light", "bend_shapes"),
     "gather_paths": ("find_sought", "gather_sought"),
+    "gather_air": ("gather_sought_air",),
     "end_paths": ("end_bent_light", "end_bent_shapes", "find_last", "end_sought"),
     "walk_clouds": ("pass_clouds",),
     "march_inside": ("look_inside_set", "walk_inside", "look_where_walks_end"),

@@ -51,7 +51,7 @@ from clfractal.integrators.waves import (
 )
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.shading.air_lights import air_turns, wide_air_turns
+from clfractal.shading.air_lights import air_turns, seeks_in_air, wide_air_turns
 from clfractal.shading.emitters import seeks_light
 from clfractal.shading.maps import asked_maps, bump_numbers, has_bump, has_glass, has_participating_media
 from clfractal.shading.materials import matter_numbers
@@ -111,7 +111,7 @@ PARTS = (
     Part("FLIGHT", FLIGHT.numbers, lambda scene, plan: int(has_participating_media(scene))),
     Part("HALT", HALT.numbers, lambda scene, plan: int(has_media(scene))),
     Part("BENT", BENT.numbers, lambda scene, plan: int(has_bent_light(scene))),
-    Part("SOUGHT", SOUGHT.numbers, lambda scene, plan: int(seeks_light(scene))),
+    Part("SOUGHT", SOUGHT.numbers, lambda scene, plan: int(seeks_light(scene) or seeks_in_air(scene))),
     # What rays to wide lights have brought, and lights that are before the interaction.
     Part("GATHERED", 3, lambda scene, plan: int(has_wide_lights(scene))),
     Part("LIGHT_BEFORE", LIGHT_BEFORE.numbers, lambda scene, plan: int(meets_lights(scene))),

@@ -244,7 +244,7 @@ PROGRAMS = (
     _Program(
         "sought",
         "integrators/sought_light.cl",
-        ("find_sought", "gather_sought", "find_last", "end_sought"),
+        ("find_sought", "gather_sought", "gather_sought_air", "find_last", "end_sought"),
         path_defines,
     ),
     _Program("media", "integrators/media.cl", ("cross_media",), path_defines),

@@ -23,7 +23,9 @@ not pay for. With media that scatter light `cross_media` stands before both and 
 `end_bent_light` before the latter (`bend_shapes` and `end_bent_shapes` where clear bodies have other shapes, too).
 Light that is sought has rays of its own, which are marched to what they meet, and
 `find_sought  [color_interactions]  [find_materials]  gather_sought` before `gather_paths`; last rays look for what they
-meet then, and `find_last  [color_interactions]  [find_materials]  end_sought` stand before `end_paths`. See
+meet then, and `find_last  [color_interactions]  [find_materials]  end_sought` stand before `end_paths`. Where fog scatters
+light, `send_air` stands behind the first interactions, and `gather_air` behind the march of the rays for light; of what the
+fog seeks, the same stages as above stand before `[color_interactions]`, with `gather_sought_air`. See
 docs/engineering/stages.md.
 """
 
@@ -40,7 +42,7 @@ from clfractal.integrators.records import bounces, hemisphere_rays
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
-from clfractal.shading.air_lights import air_turns
+from clfractal.shading.air_lights import air_turns, seeks_in_air
 from clfractal.shading.clear_bodies import clear_bodies, has_shot_bodies
 from clfractal.shading.emitters import sampled_radiance, seeks_light
 from clfractal.shading.light_records import light_rays
@@ -163,7 +165,8 @@ def most_turns(scene: Scene) -> int:
     after = max(light_turns(scene), 1) + air_turns(scene)
     if has_bent_light(scene):
         after += chain_rays(scene)
-    after += seeks_light(scene)
+    # (Those of the air are over before the others are sent.)
+    after += seeks_light(scene) or seeks_in_air(scene)
     # A path that is within a set of glass has a ray of another kind.
     return max(scene.surface.used_points.count, after, 1 + int(has_glass_set(scene)))
 
@@ -260,6 +263,16 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         """What its material is, likewise."""
         return when(finds_materials(scene), stage("find_materials", bounce=of, next_turns=turn))
 
+    def sought(gather: str, turn: int, bounce: int) -> Iterator[Stage]:
+        """What rays of that turn meet in search of light, and what it shines with."""
+        yield from objects("meet_objects", 1, turn)
+        yield from _marched(marching, 1, GOAL_SURFACE, first=turn)
+        yield from objects("look_at_objects", 1, turn)
+        yield stage("find_sought", 1, bounce=bounce, next_turns=turn)
+        # (It stands where interactions after the first one do.)
+        yield from (*asked_formula(1, turn), *asked_material(1, turn))
+        yield stage(gather, 1, bounce=bounce, next_turns=turn)
+
     yield stage("begin_samples", int(cones))
     for bounce in range(last + 1):
         within = has_glass_set(scene) and (bounce > 0 or plan.eye_body > 0)
@@ -286,6 +299,8 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         air = air_turns(scene) if bounce == 0 else 0
         # Behind the rays for light.
         yield from when(air, stage("send_air", next_turns=1 if paths else after))
+        if air and seeks_in_air(scene):
+            yield from sought("gather_sought_air", 1 + air, bounce)
         yield from asked_formula(bounce)
         yield from when(scene.cut_planes and bounce == 0 and not paths, stage("find_planes"))
         yield from when(scene.glow is not None, stage("add_glow", bounce=bounce))
@@ -312,13 +327,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
             yield from _marched(marching, last_turn, GOAL_SHADOW)
             yield from when(air, stage("gather_air", 1 + air, next_turns=1))
             if seeks:
-                yield from objects("meet_objects", 1, last_turn)
-                yield from _marched(marching, 1, GOAL_SURFACE, first=last_turn)
-                yield from objects("look_at_objects", 1, last_turn)
-                yield stage("find_sought", 1, bounce=bounce, next_turns=last_turn)
-                # (It stands where interactions after the first one do.)
-                yield from (*asked_formula(1, last_turn), *asked_material(1, last_turn))
-                yield stage("gather_sought", 1, bounce=bounce, next_turns=last_turn)
+                yield from sought("gather_sought", last_turn, bounce)
             yield stage("gather_paths", 1 + air, bounce=bounce, next_turns=1 + air)
             continue
         if after + air > 0:

@@ -12,7 +12,8 @@ import numpy.typing as npt
 
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
-from clfractal.shading.emitters import sampled_radiance
+from clfractal.schema.shape import Solid
+from clfractal.shading.emitters import emitters_of, may_seek
 from clfractal.shading.light_tree import LUMINANCE, NODE_NUMBERS, lamps_of, tree
 from clfractal.shading.set_lights import SetLights, set_lights_of
 
@@ -34,11 +35,26 @@ def has_air_sun(scene: Scene) -> bool:
 
 
 def has_air_others(scene: Scene) -> bool:
-    """Whether lamps of the tree, objects or balls on the set do, one of which is asked."""
+    """Whether lamps of the tree, things that shine or balls on the set do, one of which is asked."""
     if not scatters(scene):
         return False
     lamps, on_set = lamps_of(scene), len(scene.lights) > len(lamps_of(scene).lights)
-    return on_set or len(lamps.nodes) > 0 or any(each is not None for each in sampled_radiance(scene))
+    return on_set or len(lamps.nodes) > 0 or bool(emitters_of(scene))
+
+
+def seeks_in_air(scene: Scene) -> bool:
+    """Whether light has to be sought there: of things that do not shine the same everywhere, whose shape is not known, or
+    that the eye is within.
+    """
+    if not has_air_others(scene) or not may_seek(scene):
+        return False
+    return any(each.sought or _is_around(scene, each.thing) for each in emitters_of(scene))
+
+
+def _is_around(scene: Scene, thing: int) -> bool:
+    """Whether the eye is inside of an object, such as a room."""
+    it = list(scene.objects.values())[thing - 1]
+    return isinstance(it, Solid) and it.holds(scene.camera.position)
 
 
 def air_turns(scene: Scene) -> int:

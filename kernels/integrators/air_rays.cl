@@ -12,6 +12,20 @@
 #include "shading/air.h"
 #include "shading/air_lights.h"
 
+// Light that is sought in the air needs a ray of its own, which is marched to what it meets before all others (`sought_light.cl`): in the turn
+// behind the air's.
+INLINE void seek_in_air(stage s, int turn, ray r, const air_light *light, mask wanted, world w) {
+    const color black = color_of(R(0.0), R(0.0), R(0.0));
+    wanted &= less(R(0.0), light->seeks) & less(light->t, R(1e15)) & less(R(0.0), brightest(light->light));
+    const sought seeks = {pick(wanted, light->seeks, R(0.0)), color_pick(wanted, light->light, black), black};
+    STATE_KEEP(s, seeks, STATE_SOUGHT);
+    const real width = r.footprint + r.spread * light->t;
+    // As wide as a path that leaves a surface there.
+    const ray finds = {vec_along(r.origin, light->t, r.direction), light->toward, R(0.0), (real)(REAL_LARGEST), width,
+                       r.spread + r.footprint / fmax(light->t, width), RAY_NOTHING_KNOWN};
+    send_clipped(s, turn, finds, R(0.0), WHICH, wanted, w);
+}
+
 // The colours of turns beside those of single lights are kept behind the sum.
 INLINE void send_into_air(stage s, int turn, int kept, ray r, air_light light, mask wanted, world w) {
     wanted &= less(light.t, R(1e15)) & less(R(0.0), light.light.r + light.light.g + light.light.b);
@@ -51,7 +65,10 @@ STAGE(send_air) {
     if (w.settings->air_others) {
         air_numbers(s, &here.at, AIR_OTHERS, w, &u, &v, &other);
         air_numbers(s, &here.at, AIR_OTHERS + 1, w, &choice, &unused, &unused);
-        send_into_air(s, next_turns + i, 1 + w.settings->air_sun, r, others_in_air(&way, choice, u, v, other, w), fogged, w);
+        const int seeks = KEEPS(s, STATE_SOUGHT);
+        const air_light light = others_in_air(&way, choice, u, v, other, seeks, w);
+        send_into_air(s, next_turns + i, 1 + w.settings->air_sun, r, light, fogged & less_equal(light.seeks, R(0.0)), w);
+        if (seeks) seek_in_air(s, next_turns + i + 1, r, &light, fogged, w);
     }
 }
 

@@ -9,6 +9,16 @@ INLINE color sought_shines(stage s, const interaction *here, world w) {
     return color_scale(p.emission_color, p.emission_luminance);
 }
 
+// What a ray in search of light brings from there, unless a lamp is before it.
+INLINE color sought_brings(stage s, int turn, const interaction *found, const sought *seeks, mask *lit, world w) {
+    const ray r = queue_ray(s.q, turn, s.slot);
+    real far = way_to_interaction(found, r);
+    const real way = pick(*lit, far, R(0.0));
+    *lit &= ~light_hit_of(r.origin, r.direction, 0, &far, w).met;
+    const color brings = color_mul(seeks->brings, sought_shines(s, found, w));
+    return HAS(w, GLASS) ? absorbed(brings, seeks->extinction, way) : brings;
+}
+
 // Makes interactions of what the rays of a turn have met, as far as they are `wanted`. (Planes open no set here that shines: no face is asked.)
 INLINE interaction interaction_met(stage s, int turn, ray r, mask wanted, world w) {
     real object;
@@ -35,6 +45,23 @@ STAGE(find_sought) {
     interaction_keep(s, &found, 1);
 }
 
+// Adds what is sought in the air to what its turn brings, which nothing else does there (`air_rays.cl`).
+STAGE(gather_sought_air) {
+    STAGE_BEGINS(s, w);
+    STATE_KEPT(s, sought, seeks, STATE_SOUGHT);
+    if (!any_lane(less(R(0.0), seeks.thing))) return;
+    const interaction found = interaction_kept(s, 1);
+    mask lit = mask_of(found.found);
+    if (any_lane(lit)) {
+        const color brings = sought_brings(s, next_turns, &found, &seeks, &lit, w);
+        color light;
+        STATE_RECALL_ONE(s, light, STATE_AIR, 1 + w.settings->air_sun);
+        light = color_pick(lit, color_add(light, brings), light);
+        STATE_KEEP_ONE(s, light, STATE_AIR, 1 + w.settings->air_sun);
+    }
+    queue_skip(s.q, next_turns, s.slot);
+}
+
 // What the last rays of paths have met.
 STAGE(find_last) {
     PATH_STAGE_BEGINS(s, w);
@@ -53,12 +80,7 @@ STAGE(gather_sought) {
     const interaction found = interaction_kept(s, 1);
     mask lit = mask_of(found.found);
     if (any_lane(lit)) {
-        const ray r = queue_ray(s.q, next_turns, s.slot);
-        real far = way_to_interaction(&found, r);
-        const real way = pick(lit, far, R(0.0));
-        lit &= ~light_hit_of(r.origin, r.direction, 0, &far, w).met;
-        color brings = color_mul(seeks.brings, sought_shines(s, &found, w));
-        if (HAS(w, GLASS)) brings = absorbed(brings, seeks.extinction, way);
+        color brings = sought_brings(s, next_turns, &found, &seeks, &lit, w);
         if (bounce > 0) brings = limited(brings, w.settings);
         STATE_KEPT(s, path, so_far, STATE_PATH);
         so_far.seen = color_pick(lit, color_add(so_far.seen, brings), so_far.seen);

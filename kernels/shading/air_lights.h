@@ -1,4 +1,4 @@
-// Light in air beside that of single lamps: the sky's sun, and one for all others: lamps of the tree, objects that shine, balls on the set.
+// Light in air beside that of single lamps: the sky's sun, and one for all others: lamps of the tree, things that shine, balls on the set.
 // One of these is chosen for a ray by how strong it is and how near the ray goes by; where a tree has them, from its root down.
 
 // What a turn brings to the eye if nothing is in the way, and the ray for that.
@@ -7,6 +7,7 @@ typedef struct {
     vec toward;
     real distance;
     color light;
+    real seeks;   // where light is sought: 1 + the number of the thing that the ray has to meet; `light` is of a light of 1 then
 } air_light;
 
 INLINE air_light air_light_of(const air_way *way, real t, light_ray found, real weight, material_record m) {
@@ -36,8 +37,8 @@ INLINE real air_node_weight(const air_way *way, __global const float *tree, ints
     return near + gather_floats(tree, node + TREE_STEADY) * way->all;
 }
 
-// Goes down a tree by `place` in [0, 1): the number of a lamp, and the probability of the choice.
-CALLED real air_descent(const air_way *way, real place, mask active, __global const float *tree, material_record m, real *share) {
+// Goes down a tree by `place` in [0, 1), of which what is left is in [0, 1) again: the number of a lamp, and the probability of the choice.
+CALLED real air_descent(const air_way *way, real *place, mask active, __global const float *tree, material_record m, real *share) {
     ints node = to_ints(R(0.0));
     *share = R(1.0);
     for (;;) {
@@ -47,11 +48,11 @@ CALLED real air_descent(const air_way *way, real place, mask active, __global co
         const ints second = pick_ints(inner, TREE_NODE * to_ints(gather_floats(tree, first + TREE_END)), 0);
         const real a = air_node_weight(way, tree, first, m), b = air_node_weight(way, tree, second, m);
         const real left = tree_part(a, b), right = tree_part(b, a);
-        const mask goes_right = less_equal(left, place);
+        const mask goes_right = less_equal(left, *place);
         const real part = pick(goes_right, right, left);
         *share = pick(inner, *share * part, *share);
-        const real rest = pick(goes_right, place - left, place) / most(part, (real)(REAL_SMALLEST));
-        place = pick(inner, bounded(rest, R(0.0), R(1.0) - (real)(REAL_EPSILON)), place);
+        const real rest = pick(goes_right, *place - left, *place) / most(part, (real)(REAL_SMALLEST));
+        *place = pick(inner, bounded(rest, R(0.0), R(1.0) - (real)(REAL_EPSILON)), *place);
         node = pick_ints(inner, pick_ints(goes_right, second, first), node);
     }
     return gather_floats(tree, node + TREE_LAMP);
@@ -77,14 +78,19 @@ INLINE void air_takes(air_light *found, mask here, air_light one, real probabili
     found->toward = vec_pick(here, one.toward, found->toward);
     found->distance = pick(here, one.distance, found->distance);
     found->light = color_pick(here, color_scale(one.light, R(1.0) / most(probability, (real)(REAL_SMALLEST))), found->light);
+    found->seeks = pick(here, one.seeks, found->seeks);
 }
 
 INLINE real lamps_in_air(const air_way *way, __global const float *tree, int nodes, world w) {
     return nodes > 0 ? air_node_weight(way, tree, to_ints(R(0.0)), w.material) : R(0.0);
 }
 
+// Whether a thing has no end: it shines alike into the air near by and far away.
+#define IS_ENDLESS(o) ((o)->kind == SHAPE_PLANE)
+
 // (A ball of the same area as an object's three sides has about its strength from afar.)
 INLINE real emitter_in_air(const air_way *way, object_record o, world w) {
+    if (IS_ENDLESS(o)) return (real)(LIGHT_PI * o->luminance) * way->all;
     const scalar x = o->sides[0], y = o->sides[1], z = o->sides[2];
     const scalar radius = sqrt(x * x + y * y + z * z);
     return air_weight(way, vec_splat(o->middle), (real)(radius), (real)(o->luminance * (x * y + y * z + z * x)), w.material);
@@ -94,7 +100,7 @@ INLINE real emitter_in_air(const air_way *way, object_record o, world w) {
 CALLED void air_of_lamps(air_light *found, const air_way *way, real place, mask here, real probability, real u, real v, real other, world w) {
     real share;
     scalar number[LANES];
-    lanes_store(air_descent(way, place, here, LIGHT_TREE(w), w.material, &share), number);
+    lanes_store(air_descent(way, &place, here, LIGHT_TREE(w), w.material, &share), number);
     while (any_lane(here)) {
         const int i = (int)number[highest_bit(lanes_bits(here))];
         const mask same = here & equal(lanes_load(number), (real)((scalar)i));
@@ -106,20 +112,67 @@ CALLED void air_of_lamps(air_light *found, const air_way *way, real place, mask 
     }
 }
 
+// A direction that the phase function chooses, for what fills much of what a place sees; towards a thing without an end by a mirror in it, so
+// that none is lost. Light from there, of 1, and the density of both.
+INLINE light_ray emitter_by_phase(object_record o, const air_way *way, vec point, real u, real v, world w) {
+    const real g = (real)(w.material->fog_anisotropy);
+    light_ray r = {phase_direction(way->r.direction, u, v, g), (real)(REAL_LARGEST), color_of(R(1.0), R(1.0), R(1.0)), R(1.0)};
+    r.density = phase_of(vec_dot(r.toward, way->r.direction), g);
+    if (!IS_ENDLESS(o)) return r;
+    const vec turned = emitter_turned(o, r.toward);
+    const real high = emitter_turned(o, vec_sub(point, vec_splat(o->middle))).z;
+    const vec mirrored = emitter_in_space(o, vec_of(turned.x, turned.y, -turned.z));
+    r.density += phase_of(vec_dot(mirrored, way->r.direction), g);
+    r.toward = vec_pick(less(R(0.0), turned.z * high), mirrored, r.toward);
+    const real distance = fabs(high) / most(fabs(turned.z), R(1e-6));
+    r.distance = distance - emitter_lift(o, point, distance);
+    r.light = color_splat(o->radiance);
+    return r;
+}
+
+// One of the things that shine. From inside of it, or of the ball in which it is sought, nobody samples it: there it is sought by chance, if
+// the scene `seeks`.
 CALLED void air_of_emitter(air_light *found, const air_way *way, real place, mask here, real probability, object_record o, real u, real v,
-                           real other, world w) {
-    real weight;
-    const air_about about = air_about_place(way, vec_splat(o->middle), R(0.0), w.material);
-    const real t = place_about(way, &about, u, w.material, &weight);
+                           real other, int seeks, world w) {
+    real weight = way->all, t = place_by_depth(way, u, w.material);
+    if (!IS_ENDLESS(o)) {
+        const air_about about = air_about_place(way, vec_splat(o->middle), R(0.0), w.material);
+        t = place_about(way, &about, u, w.material, &weight);
+    }
     const vec point = vec_along(way->r.origin, t, way->r.direction);
-    // Nobody asks from inside.
-    weight = pick(less(R(0.0), emitter_weight(o, &point)), weight, R(0.0));
-    air_takes(found, here, air_light_of(way, t, emitter_ray(o, point, place, v, other), weight, w.material), probability);
+    const mask inside = IS_ENDLESS(o) ? less(R(1.0), R(0.0)) : ~less(R(0.0), emitter_weight(o, &point));
+    light_ray r = IS_ENDLESS(o) ? emitter_by_phase(o, way, point, v, other, w) : emitter_ray(o, point, place, v, other);
+    if (any_lane(inside)) {
+        const light_ray within = emitter_by_phase(o, way, point, v, other, w);
+        r.toward = vec_pick(inside, within.toward, r.toward);
+        r.distance = pick(inside, within.distance, r.distance);
+        r.light = color_pick(inside, within.light, r.light);
+        r.density = pick(inside, within.density, r.density);
+    }
+    if (!seeks) weight = pick(inside, R(0.0), weight);
+    air_light one = air_light_of(way, t, r, weight, w.material);
+    const mask sought = inside | (o->sought ? ~0 : 0);
+    one.seeks = pick(sought, R(1.0) + emitter_thing(o), R(0.0));
+    air_takes(found, here, one, probability);
+}
+
+// One of the tree's things likewise.
+CALLED void air_of_emitters(air_light *found, const air_way *way, real place, mask here, real probability, real u, real v, real other,
+                            int seeks, world w) {
+    real share;
+    scalar number[LANES];
+    lanes_store(air_descent(way, &place, here, EMITTER_TREE(w), w.material, &share), number);
+    while (any_lane(here)) {
+        const int i = (int)number[highest_bit(lanes_bits(here))];
+        const mask same = here & equal(lanes_load(number), (real)((scalar)i));
+        air_of_emitter(found, way, place, same, probability * share, emitter_record(i, w), u, v, other, seeks, w);
+        here &= ~same;
+    }
 }
 
 CALLED void air_of_balls(air_light *found, const air_way *way, real place, mask here, real probability, real u, real v, real other, world w) {
     real share, weight;
-    const set_ball ball = set_ball_of(air_descent(way, place, here, w.tables + w.settings->ball_tree, w.material, &share), w);
+    const set_ball ball = set_ball_of(air_descent(way, &place, here, w.tables + w.settings->ball_tree, w.material, &share), w);
     const air_about about = air_about_place(way, ball.center, R(0.0), w.material);
     const real t = place_about(way, &about, u, w.material, &weight);
     const vec point = vec_along(way->r.origin, t, way->r.direction);
@@ -131,26 +184,28 @@ CALLED void air_of_balls(air_light *found, const air_way *way, real place, mask 
 }
 
 // One of all others; below 0 is the distance where nothing can be in the way.
-INLINE air_light others_in_air(const air_way *way, real choice, real u, real v, real other, world w) {
+INLINE air_light others_in_air(const air_way *way, real choice, real u, real v, real other, int seeks, world w) {
     const mask all = less(R(0.0), R(1.0));
     const real lamps = lamps_in_air(way, LIGHT_TREE(w), w.settings->tree_nodes, w);
     const real balls = lamps_in_air(way, w.tables + w.settings->ball_tree, w.settings->ball_nodes, w);
-    air_choice c = {R(0.0), R(0.0), lamps + balls, all};
-    const int count = HAS(w, EMITTERS) ? w.settings->object_count : 0;
-    for (int i = 0; i < count; ++i) c.total += w.objects[i].sampled ? emitter_in_air(way, w.objects + i, w) : R(0.0);
+    const int emitters = HAS(w, EMITTERS) ? w.settings->single_emitters : 0;
+    const real of_tree = lamps_in_air(way, EMITTER_TREE(w), w.settings->emitter_nodes, w);
+    air_choice c = {R(0.0), R(0.0), lamps + balls + of_tree, all};
+    for (int i = 0; i < emitters; ++i) c.total += emitter_in_air(way, emitter_record(i, w), w);
     c.place = choice * c.total;
-    air_light found = {R(0.0), vec_of(R(0.0), R(0.0), R(1.0)), R(0.0), color_of(R(0.0), R(0.0), R(0.0))};
+    air_light found = {R(0.0), vec_of(R(0.0), R(0.0), R(1.0)), R(0.0), color_of(R(0.0), R(0.0), R(0.0)), R(0.0)};
     const real whole = R(1.0) / most(c.total, (real)(REAL_SMALLEST));
     real place;
     mask here = air_chosen(&c, lamps, &place);
     if (any_lane(here)) air_of_lamps(&found, way, place, here, lamps * whole, u, v, other, w);
     here = air_chosen(&c, balls, &place);
     if (any_lane(here)) air_of_balls(&found, way, place, here, balls * whole, u, v, other, w);
-    for (int i = 0; i < count; ++i) {
-        if (!w.objects[i].sampled) continue;
-        const real weight = emitter_in_air(way, w.objects + i, w);
+    here = air_chosen(&c, of_tree, &place);
+    if (any_lane(here)) air_of_emitters(&found, way, place, here, of_tree * whole, u, v, other, seeks, w);
+    for (int i = 0; i < emitters; ++i) {
+        const real weight = emitter_in_air(way, emitter_record(i, w), w);
         here = air_chosen(&c, weight, &place);
-        if (any_lane(here)) air_of_emitter(&found, way, place, here, weight * whole, w.objects + i, u, v, other, w);
+        if (any_lane(here)) air_of_emitter(&found, way, place, here, weight * whole, emitter_record(i, w), u, v, other, seeks, w);
     }
     return found;
 }

@@ -28,16 +28,20 @@ CALLED real emitters_weight(const vec *point, real own, world w) {
     return sum;
 }
 
-// A place of an object, chosen by numbers in [0, 1), and the ray to it, which ends a little before the object: it would be in its own way.
-INLINE light_ray emitter_ray(object_record o, vec from, real choice, real u, real v) {
+// How far before an object a ray to it ends: it would be in its own way.
+INLINE real emitter_lift(object_record o, vec from, real distance) {
     const real far_out = fmax(fmax(fabs(from.x), fabs(from.y)), fabs(from.z));
+    const real thin = fmin(fmin(EMITTER_SIDE(o, 0), EMITTER_SIDE(o, 1)), EMITTER_SIDE(o, 2));
+    return R(1e-3) * fmin(thin, distance) + R(64.0) * (real)(REAL_EPSILON) * (distance + far_out);
+}
+
+// A place of an object, chosen by numbers in [0, 1), and the ray to it.
+INLINE light_ray emitter_ray(object_record o, vec from, real choice, real u, real v) {
     const emitter_place found = emitter_chosen(o, &from, choice, u, v);
     const vec way = emitter_in_space(o, found.way);
     const real distance = sqrt(vec_dot(way, way));
-    const real thin = fmin(fmin(EMITTER_SIDE(o, 0), EMITTER_SIDE(o, 1)), EMITTER_SIDE(o, 2));
-    const real lift = R(1e-3) * fmin(thin, distance) + R(64.0) * (real)(REAL_EPSILON) * (distance + far_out);
     const mask usable = less(R(0.0), found.density);
-    return (light_ray){vec_normalize(way), distance - lift, color_pick(usable, color_splat(o->radiance), color_of(R(0.0), R(0.0), R(0.0))),
+    return (light_ray){vec_normalize(way), distance - emitter_lift(o, from, distance), color_pick(usable, color_splat(o->radiance), color_of(R(0.0), R(0.0), R(0.0))),
                        pick(usable, found.density, R(1.0))};
 }
 

@@ -70,6 +70,10 @@ FEATURES_OF_PATHS: dict[str, tuple[dict[str, Any], set[str]]] = {
     "map": (FEATURES["map"][0], set()),
     "shining object": ({"objects": {"ball": {**BALL, "material": "glow"}}, "materials": GLOW}, {"objects"}),
     "sought light": ({"material": {"name": "glow"}, "materials": GLOW}, {"sought"}),
+    "shafts of sought light": (
+        {"material": {"name": "glow"}, "materials": GLOW, **FEATURES["shafts"][0]},
+        {"air", "sought"},
+    ),
     "map of a material": (
         {
             "material": {"name": "m"},
