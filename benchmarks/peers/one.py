@@ -12,6 +12,7 @@ from benchmarks.peers import causes, ours, theirs
 from benchmarks.peers.compare import likeness
 from clfractal.engine.engine import Engine
 from clfractal.errors import ClfractalError
+from clfractal.exchange.placing import placing_of
 from clfractal.exchange.view import is_mirrored
 
 
@@ -29,7 +30,7 @@ def record(path: Path, side: int, seconds: float, keep: Path | None = None) -> d
         found |= {"dropped": causes.dropped(scene), "habits": causes.habits(settings)}
         bare = ours.bare(scene, side)
         found["stage"] = "theirs"
-        rays, eye = ours.rays(bare, side, mirrored=is_mirrored(settings))
+        rays, eye = ours.rays(bare, side, mirrored=is_mirrored(settings), placing=placing_of(settings))
         start = time.perf_counter()
         seen = theirs.depths(path, settings.main, side, rays, eye, seconds)
         found["theirs_s"] = round(time.perf_counter() - start, 2)

@@ -13,6 +13,7 @@ from benchmarks.truth.picture import see
 from clfractal.camera.views import scene_view
 from clfractal.engine.engine import Engine
 from clfractal.exchange.mandelbulber import Imported, imported
+from clfractal.exchange.placing import Placing
 from clfractal.exchange.settings import Settings, read_settings
 from clfractal.scene.load import load_scene
 from clfractal.scene.model import Scene
@@ -58,7 +59,7 @@ def bare(found: Imported, side: int) -> Scene:
     return load_scene(data)
 
 
-def rays(scene: Scene, side: int, *, mirrored: bool) -> tuple[Floats, Floats]:
+def rays(scene: Scene, side: int, *, mirrored: bool, placing: Placing | None = None) -> tuple[Floats, Floats]:
     """Directions of length 1 through the other program's pixels, shape (side, side, 3), and the eye, in its own space."""
     view = scene_view(scene)
     assert view.eye is not None
@@ -72,8 +73,11 @@ def rays(scene: Scene, side: int, *, mirrored: bool) -> tuple[Floats, Floats]:
     directions = on_plane - view.eye
     directions /= np.linalg.norm(directions, axis=-1, keepdims=True)
     flip = np.array([1.0, 1.0, -1.0 if mirrored else 1.0])
-    eye = np.asarray(view.eye, float)
-    return directions * flip, eye * flip
+    directions, eye = directions * flip, np.asarray(view.eye, float) * flip
+    if placing is None:
+        return directions, eye
+    turn = np.array(placing.turn)
+    return directions @ turn, eye @ turn + placing.position
 
 
 def depths(scene: Scene, side: int, engine: Engine) -> Floats:

@@ -12,10 +12,11 @@ from clfractal.exchange.colors import coloring_of
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
 from clfractal.exchange.measure import are_inside
+from clfractal.exchange.placing import mirror, place_around, placing_of
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
 from clfractal.exchange.solids import solids_of
-from clfractal.exchange.view import is_mirrored, mirror, view_of
+from clfractal.exchange.view import is_mirrored, view_of
 from clfractal.files.fragments import block_lines
 
 # What windows, films, files and other ways to look at a scene have, and what says how theirs are computed.
@@ -150,9 +151,13 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     solids, materials = solids_of(settings.main, remarks)
     joined = joined_of(settings, installed, remarks)
     # What joins all before it is cut to the limits in the end.
-    objects = {**solids, **joined, **scene.pop("objects", {})}
+    limits = scene.pop("objects", {})
+    objects = {**solids, **joined, **limits}
     if objects:
         scene["objects"] = objects
+    placing = placing_of(settings)
+    if placing is not None:
+        place_around(scene, placing, (*solids, *limits))
     if materials:
         scene["materials"] = materials
     if is_mirrored(settings):

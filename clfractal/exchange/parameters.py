@@ -74,7 +74,8 @@ class Parameters:
         return self.section.number(key, default)
 
     def _choice(self, key: str, word: str) -> float:
-        """A way to do something, as old files name it: `type2`, or a word of the texts' own names."""
+        """A way to do something, as old files name it: `type2`, `combo_mode1`, or a word of the texts' own names."""
+        word = word.removeprefix("combo_")
         if word.startswith("type") and word[4:].isdecimal() and len(word) < 8:
             return float(int(word[4:]) - 1)
         names = {name: number for name, number in self.choices.items() if name.endswith(f"_{word}")}
@@ -133,7 +134,7 @@ class Parameters:
             found = rotation_of_box(
                 self.read(f"mandelbox_rotation_{('neg', 'pos')[indices[0]]}_{indices[1] + 1}")
             )
-            return found if name == "rot" else _transposed(found)
+            return found if name == "rot" else transposed(found)
         return None
 
     def _of_ifs(self, name: str, indices: Sequence[int]) -> Found | None:
@@ -159,7 +160,13 @@ class Parameters:
 def rotation_of_box(angles: Found) -> Matrix:
     """The matrix of the Mandelbox's angles in degrees, about x, y and z: Rx Ry Rz."""
     x, y, z = (_about(axis, angle) for axis, angle in enumerate(_radians(angles)))
-    return _times(_times(x, y), z)
+    return times(times(x, y), z)
+
+
+def rotation_of_set(angles: Found) -> Matrix:
+    """The matrix of three angles in degrees by which sets are turned, about x, y and z: Rz Ry Rx."""
+    x, y, z = (_about(axis, angle) for axis, angle in enumerate(_radians(angles)))
+    return times(times(z, y), x)
 
 
 def rotation(angles: Found, *, reverse: bool = False) -> Matrix:
@@ -167,8 +174,8 @@ def rotation(angles: Found, *, reverse: bool = False) -> Matrix:
     first, second, third = _radians(angles)
     about_z, about_x, about_y = _about(2, first), _about(0, second), _about(1, third)
     if reverse:
-        return _times(_times(about_y, about_x), about_z)
-    return _times(_times(about_z, about_x), about_y)
+        return times(times(about_y, about_x), about_z)
+    return times(times(about_z, about_x), about_y)
 
 
 def _radians(angles: Found) -> tuple[float, float, float]:
@@ -186,14 +193,16 @@ def _about(axis: int, angle: float) -> Matrix:
     return (c, -s, 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)
 
 
-def _times(a: Matrix, b: Matrix) -> Matrix:
+def times(a: Matrix, b: Matrix) -> Matrix:
+    """The product of two matrices."""
     one, two, three = (
         tuple(sum(row[k] * b[k][column] for k in range(3)) for column in range(3)) for row in a
     )
     return one, two, three
 
 
-def _transposed(a: Matrix) -> Matrix:
+def transposed(a: Matrix) -> Matrix:
+    """A matrix with rows and columns in exchange."""
     one, two, three = zip(*a, strict=True)
     return one, two, three
 

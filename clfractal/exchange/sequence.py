@@ -14,9 +14,11 @@ from clfractal.errors import FileError, Where
 from clfractal.exchange.counterparts import counterpart
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
+from clfractal.exchange.parameters import rotation_of_set
+from clfractal.exchange.placing import angles_of
 from clfractal.exchange.settings import SLOTS, Section, Settings
 from clfractal.exchange.translate import NO_FOLDS, Folds, KeepsError, Space
-from clfractal.exchange.translated import Addition, Following, NeedsFourError, Text, text_of
+from clfractal.exchange.translated import STAYS, Addition, Following, NeedsFourError, Text, text_of
 from clfractal.exchange.view import is_mirrored
 
 MOST_ITERATIONS = 1_000_000
@@ -42,6 +44,7 @@ class Slot:
     count: int
     start: int
     stop: int
+    weight: float = 1.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,7 +63,7 @@ class Plan:
 
     def addition(self, slot: Slot) -> Addition:
         """What is added after a formula."""
-        if not slot.adds:
+        if not slot.adds or slot.weight == 0:
             return Addition()
         swapped = slot.number in ADD_SWAPPED
         if self.julia is None:
@@ -81,13 +84,18 @@ def formula_of(settings: Settings, installed: Installed | None, remarks: list[st
     joined = main.flag("boolean_operators", False)
     hybrid = main.flag("hybrid_fractal_enable", False) and not joined
     used = _used(settings, hybrid, joined)
-    slots = [_slot(settings, slot, remarks) for slot in used]
-    if hybrid:
-        _note_weights(settings, slots, remarks)
+    slots = [_slot(settings, slot, remarks, hybrid=hybrid) for slot in used]
+    for slot in slots:
+        if slot.weight not in (0, 1):
+            remarks.append(f"formula_weight_{slot.slot}: its map is not blended with z by {slot.weight:g}")
     if joined:
         _note_places(settings, 1, remarks, ("position", "rotation", "repeat"))
         if main.number("formula_scale_1", 1.0) != 1:
             remarks.append("formula_scale_1: the first formula keeps its own size")
+    else:
+        main.without(main.beginning("formula_scale_"))
+    if not hybrid:
+        main.without(main.beginning("formula_weight_"))
     plan = _plan(settings, "_1" if joined else "", installed, remarks)
     alone = len(slots) == 1 and (installed is None or not _has_discs(plan, slots))
     section = _by_library(plan, slots[0]) if alone else None
@@ -121,15 +129,18 @@ def joined_of(settings: Settings, installed: Installed | None, remarks: list[str
             remarks.append(str(error).removeprefix(f"{settings.file}:"))
             continue
         size = max(main.number(f"formula_scale_{slot}", 1.0), 1e-6)
-        _note_places(settings, slot, remarks, ("rotation", "repeat"))
+        _note_places(settings, slot, remarks, ("repeat",))
         position = list(main.vector(f"formula_position_{slot}"))
         placed = {
             "type": "formula",
             "formula": section,
             "position": position,
-            "scale": 1 / size,
+            "scale": size,
             "join": joins,
         }
+        angles = angles_of(rotation_of_set(main.vector(f"formula_rotation_{slot}")))
+        if any(angles):
+            placed["rotation"] = angles
         found[f"formula {slot}"] = placed
     _without_others(settings)
     return found
@@ -201,7 +212,7 @@ def _used(settings: Settings, hybrid: bool, joined: bool) -> list[int]:
     return used
 
 
-def _slot(settings: Settings, slot: int, remarks: list[str]) -> Slot:
+def _slot(settings: Settings, slot: int, remarks: list[str], *, hybrid: bool = False) -> Slot:
     main = settings.main
     key = f"formula_{slot}"
     number = main.whole(key, 2 if slot == 1 else 0)
@@ -219,15 +230,8 @@ def _slot(settings: Settings, slot: int, remarks: list[str]) -> Slot:
         max(main.whole(f"formula_iterations_{slot}", 1), 1),
         max(main.whole(f"formula_start_iteration_{slot}", 0), 0),
         main.whole(f"formula_stop_iteration_{slot}", _NEVER),
+        main.number(f"formula_weight_{slot}", 1.0) if hybrid else 1.0,
     )
-
-
-def _note_weights(settings: Settings, slots: Sequence[Slot], remarks: list[str]) -> None:
-    for slot in slots:
-        key = f"formula_weight_{slot.slot}"
-        weight = settings.main.number(key, 1.0)
-        if weight != 1:
-            remarks.append(f"{key}: its map is not blended with z by {weight:g}")
 
 
 def _by_library(plan: Plan, slot: Slot) -> dict[str, Any] | None:
@@ -325,6 +329,8 @@ def _text(plan: Plan, slot: Slot) -> Text:
     fractal = plan.settings.fractal(slot.slot)
     where = plan.settings.main.where(f"formula_{slot.slot}")
     found = text_of(slot.number, fractal, plan.installed)
+    if found is not None and slot.weight == 0:  # its turn leaves z where it is
+        found.statements = STAYS
     if found is None:
         reason = counterpart(slot.number, fractal)
         why = reason if isinstance(reason, str) else "our library has it, but not with what is added here"
@@ -343,9 +349,6 @@ def _followed(
     found = []
     for application, number in enumerate(order):
         formula = following.applied(texts[number], application, plan.addition(by_number[number]))
-        if plan.julia is not None and formula["add"] == "point":
-            where = plan.settings.main.where("julia_mode")
-            raise FileError(f"formula {by_number[number].number} asks for the point in a Julia set", where)
         found.append(formula)
     return found
 

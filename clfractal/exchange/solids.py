@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from clfractal.exchange.look import decoded
-from clfractal.exchange.parameters import Matrix, rotation
+from clfractal.exchange.parameters import rotation
+from clfractal.exchange.placing import angles_of
 from clfractal.exchange.settings import Section
 
 MOST = 64
@@ -86,19 +86,10 @@ def _placed(main: Section, key: str, kind: str, along: float = 0.0, **numbers: A
         "position": [a + along * b for a, b in zip(place, matrix[2], strict=True)],
         **numbers,
     }
-    angles = _angles(matrix)
+    angles = angles_of(matrix)
     if any(angles):
         found["rotation"] = angles
     return found
-
-
-def _angles(matrix: Matrix) -> list[float]:
-    """Our angles about x, then y, then z, in degrees, of an object that their matrix turns back."""
-    # Ours turns the object, theirs turns space: one is the other transposed.
-    x = math.atan2(matrix[1][2], matrix[2][2])
-    y = -math.asin(min(max(matrix[0][2], -1.0), 1.0))
-    z = math.atan2(matrix[0][1], matrix[0][0])
-    return [round(math.degrees(each), 6) + 0.0 for each in (x, y, z)]
 
 
 def _flat(main: Section, key: str, kind: str) -> dict[str, Any]:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from clfractal.errors import FileError, Where
-from clfractal.exchange.c_text import Statement
+from clfractal.exchange.c_text import Expression, Statement
 from clfractal.exchange.installed import Installed
 from clfractal.exchange.parameters import Parameters
 from clfractal.exchange.settings import Section
@@ -28,6 +28,10 @@ from clfractal.exchange.translate import (
 _TITLE = 60
 _STEP_SCALE = 0.7
 """Of distances that are a little too large."""
+
+
+STAYS = (Statement("return", "", (Expression("name", "z", (), 0),), (), 0),)
+"""The text of a formula that leaves z where it is."""
 
 
 @dataclass(frozen=True, slots=True)

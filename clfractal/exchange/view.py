@@ -90,28 +90,9 @@ def _lens(main: Section, fov: float) -> dict[str, float]:
 def is_mirrored(settings: Settings) -> bool:
     """Whether the picture is upside down: that of old files, where an axis of space pointed the other way.
 
-    A picture that is mirrored is one of mirrored space: z points the other way in our scene, see `mirror`.
+    A picture that is mirrored is one of mirrored space: z points the other way in our scene, see `placing.mirror`.
     """
     return settings.main.flag("legacy_coordinate_system", False)
-
-
-def mirror(scene: dict[str, Any]) -> None:
-    """Turns a scene's z axis around, but for its formula, so that its picture is upside down."""
-
-    def turned(vector: list[float], sign: int = 1) -> list[float]:
-        return [sign * vector[0] + 0.0, sign * vector[1] + 0.0, -sign * vector[2] + 0.0]
-
-    camera, background = scene["camera"], scene["background"]
-    camera |= {key: turned(camera[key]) for key in ("position", "target")}
-    camera["up"] = turned(camera["up"], -1)
-    scene["background"] = {"top": background["bottom"], "bottom": background["top"]}
-    for part in (*scene["lights"], *scene.get("objects", {}).values()):
-        part |= {key: turned(part[key]) for key in ("position", "direction", "normal") if key in part}
-        if "rotation" in part:  # a mirror turns what goes about x and y the other way
-            x, y, z = part["rotation"]
-            part["rotation"] = [-x + 0.0, -y + 0.0, z]
-        if part.get("type") in ("plane", "water"):
-            part["normal"] = part.get("normal", [0, 0, -1])
 
 
 def _parallel(one: Any, other: Any) -> bool:

@@ -398,7 +398,7 @@ class TestSolids:
         scene = load_scene(found.scene)
         assert found.scene["formula"]["name"] == "menger_sponge"
         cut, common = (found.scene["objects"][f"formula {slot}"] for slot in (2, 3))
-        assert (cut["join"], cut["position"], cut["scale"]) == ("cut", [1, 2, 3], 0.25)
+        assert (cut["join"], cut["position"], cut["scale"]) == ("cut", [1, 2, 3], 4)
         assert cut["formula"]["julia"] == [0.1, 0.2, 0.3]
         assert (common["join"], common["formula"]["name"]) == ("intersection", "mandelbox")
         assert len(scene.joined) == 2

@@ -1,0 +1,133 @@
+"""Sets that a settings file turns, moves and blends, and what stands around them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.peers import causes, theirs
+from benchmarks.peers.one import record
+from clfractal.elements.shapes.box import BoxObject
+from clfractal.exchange.mandelbulber import import_text
+from clfractal.exchange.parameters import rotation
+from clfractal.exchange.placing import placing_of
+from clfractal.exchange.settings import parse_settings
+from clfractal.scene.load import load_scene
+from tests.exchange.files import program, settings
+from tests.exchange.test_translate import POINTS, formula_of, mapped
+
+CAMERA = "camera 1.5 -2.4 1.1;\ntarget 0.1 0.2 0.1;\ncamera_top 0.1 0.2 1;\nfov 0.9;"
+TURNED = "fractal_rotation -35 62 110;\nfractal_position 0.2 0.1 0.3;"
+BOX = (
+    "primitive_box_1_enabled true;\nprimitive_box_1_position 0.9 -0.7 -0.4;\n"
+    "primitive_box_1_rotation 20 -35 50;\nprimitive_box_1_size 0.3 0.6 0.9;"
+)
+LEVEL = "primitive_plane_1_enabled true;\nprimitive_plane_1_position 0 0 -1;"
+SPONGE = "formula_1 7;\nN 4;"
+BULB = "alpha_enabled 1;\nN 9;"
+
+
+def turn_of(angles: tuple[float, float, float]) -> np.ndarray:
+    """Rz Ry Rx: a place in the set's space, of one around it."""
+    found = np.eye(3)
+    for axis, angle in enumerate(np.radians(angles)):
+        c, s = np.cos(angle), np.sin(angle)
+        one, other = (axis + 1) % 3, (axis + 2) % 3
+        about = np.eye(3)
+        about[[one, one, other, other], [one, other, one, other]] = c, -s, s, c
+        found = about @ found
+    return found
+
+
+def test_what_is_around_a_turned_set() -> None:
+    lamp = "aux_light_enabled_1 true;\naux_light_position_1 3 0.5 1;"
+    found = import_text(settings(f"{CAMERA}\n{SPONGE}\n{TURNED}\n{BOX}\n{LEVEL}\n{lamp}"), "x.fract")
+    turn, place = turn_of((-35, 62, 110)), np.array([0.2, 0.1, 0.3])
+    np.testing.assert_allclose(found.scene["camera"]["position"], turn @ ([1.5, -2.4, 1.1] - place))
+    np.testing.assert_allclose(found.scene["camera"]["target"], turn @ ([0.1, 0.2, 0.1] - place))
+    np.testing.assert_allclose(found.scene["camera"]["up"], turn @ [0.1, 0.2, 1])
+    level = found.scene["objects"]["plane 1"]
+    np.testing.assert_allclose(level["position"], turn @ ([0, 0, -1] - place))
+    np.testing.assert_allclose(level["normal"], turn @ [0, 0, 1], atol=1e-12)
+    (shines,) = (light for light in found.scene["lights"] if light.get("type") == "point")
+    np.testing.assert_allclose(shines["position"], turn @ ([3, 0.5, 1] - place))
+    box = load_scene(found.scene).objects["box 1"]
+    assert isinstance(box, BoxObject)
+    own = np.array(rotation((20.0, -35.0, 50.0, 0.0), reverse=True))
+    for point in np.random.default_rng(1).normal(size=(300, 3)) * 0.5 + [0.9, -0.7, -0.4]:
+        inside = bool(np.all(np.abs(own @ (point - [0.9, -0.7, -0.4])) <= [0.15, 0.3, 0.45]))
+        assert box.holds(tuple(turn @ (point - place))) == inside
+    assert not any("fractal_" in remark for remark in found.remarks)
+
+
+def test_a_set_that_stays_has_no_place_of_its_own() -> None:
+    assert placing_of(parse_settings(settings(f"{CAMERA}\nfractal_rotation 0 0 0;"), "x.fract")) is None
+
+
+def test_a_joined_formula_has_place_rotation_and_size() -> None:
+    keys = (
+        "boolean_operators true;\nformula_1 7;\nformula_2 8;\nformula_position_2 1 2 3;\nformula_scale_2 0.2;"
+    )
+    found = import_text(
+        settings(f"{CAMERA}\n{keys}\nformula_rotation_2 10 20 30;\nformula_weight_2 0.5;"), "x.fract"
+    )
+    placed = found.scene["objects"]["formula 2"]
+    assert (placed["position"], placed["scale"]) == ([1, 2, 3], 0.2)
+    x, y, z = placed["rotation"]
+    # Ours turn the object, about x, then y, then z: the other way round.
+    ours = turn_of((x, y, z))
+    np.testing.assert_allclose(ours.T, turn_of((10, 20, 30)), atol=1e-7)
+    assert found.remarks == ()
+
+
+def test_formulas_of_no_weight_leave_z_where_it_is(tmp_path: Path) -> None:
+    text = "REAL4 AIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux) { return z * %s; }"
+    folder = program(tmp_path, menger_mod1=text % "2.0f", xenodreambuie=text % "3.0f")
+    hybrid = "hybrid_fractal_enable true;\nformula_1 61;\nformula_2 11;\nformula_weight_2 %s;"
+    for weight, factor in (("0", 1.0), ("1", 3.0)):
+        section = formula_of(folder, "", hybrid % weight)
+        members = [each["inline"] for each in section["inline"]["chain"]]
+        first, second = (
+            next(each for each in members if each["title"].startswith(f"Formula {number} "))
+            for number in (61, 11)
+        )
+        np.testing.assert_allclose(mapped(first, POINTS, 0 * POINTS), 2 * POINTS)
+        np.testing.assert_allclose(mapped(second, POINTS, 0 * POINTS), factor * POINTS)
+        assert second["add"] == ("point" if factor > 1 else "none")
+
+
+def test_a_julia_set_whose_formula_asks_for_the_point(tmp_path: Path) -> None:
+    text = """REAL4 AIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	z.x = z.x * z.x + aux->const_c.y;
+	return z;
+}
+"""
+    section = formula_of(
+        program(tmp_path, xenodreambuie=text), "", "formula_1 11;\njulia_mode true;\njulia_c 0.1 0.2 0.3;"
+    )
+    formula = section["inline"]["chain"][-1]["inline"]
+    x, y, z = POINTS
+    point = POINTS[::-1]
+    expected = np.array([x * x + point[1] + 0.1, y + 0.2, z + 0.3])
+    np.testing.assert_allclose(mapped(formula, POINTS, point), expected, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+@pytest.mark.parametrize(
+    "keys",
+    [
+        f"{SPONGE}\n{TURNED}\n{BOX}",
+        f"{BULB}\n{TURNED}\njulia_mode true;\njulia_c -0.9 0.3 0.2;",
+        "boolean_operators true;\nformula_1 7;\nformula_2 7;\nN 4;\nformula_position_2 0.4 -0.5 0.6;\n"
+        "formula_rotation_2 -35 62 110;\nformula_scale_2 0.6;",
+    ],
+    ids=["sponge", "julia", "joined"],
+)
+def test_turned_sets_in_both_programs(keys: str, tmp_path: Path) -> None:
+    path = tmp_path / "turned.fract"
+    path.write_text(settings(f"{CAMERA}\n{keys}"), encoding="utf-8")
+    found = record(path, 48, 100)
+    assert causes.verdict(found) == "alike", found
