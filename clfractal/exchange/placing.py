@@ -1,4 +1,4 @@
-"""What stands around the set of a settings file, in the set's own space: turned and moved with it, or mirrored.
+"""What stands around the set of a settings file, in the set's own space: turned, moved or mirrored.
 
 Theirs turn and move the set (`fractal_rotation`, `fractal_position`). Our formula stays where it is, and all else goes the
 other way around it.

@@ -16,7 +16,7 @@ from clfractal.exchange.placing import placing_of
 from clfractal.exchange.settings import parse_settings
 from clfractal.scene.load import load_scene
 from tests.exchange.files import program, settings
-from tests.exchange.test_translate import POINTS, formula_of, mapped
+from tests.exchange.maps import POINTS, formula_of, mapped
 
 CAMERA = "camera 1.5 -2.4 1.1;\ntarget 0.1 0.2 0.1;\ncamera_top 0.1 0.2 1;\nfov 0.9;"
 TURNED = "fractal_rotation -35 62 110;\nfractal_position 0.2 0.1 0.3;"
