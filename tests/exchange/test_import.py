@@ -8,9 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import HealthCheck, given
-from hypothesis import settings as of_tests
-from hypothesis import strategies as st
 
 from clfractal.camera.views import camera_view
 from clfractal.errors import ClfractalError, FileError
@@ -286,57 +283,6 @@ class TestShell:
         assert scene.chain.links[0].bound.formula.title == "Formula 61 of Mandelbulber"
         made_of = Path("theirs") / "formula" / "opencl" / "menger_mod1.cl"
         assert f"formula_1, 61, is made of {made_of}" in Path("fold.yaml").read_text(encoding="utf-8")
-
-
-WORDS = (
-    "nan",
-    "1e30",
-    "-1e30",
-    "",
-    "true",
-    "0 0 0",
-    "999999999999",
-    "ffff ffff ffff",
-    "1,5",
-    "1;2",
-    "é",
-    "type2",
-    "-1",
-)
-
-
-@of_tests(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.too_slow])
-@given(st.data())
-def test_mutations_end_in_a_scene_or_in_one_line(data: st.DataObject) -> None:
-    lines = settings(
-        f"{CAMERA}\nformula_1 8;\nformula_2 7;\nhybrid_fractal_enable true;\nformula_iterations_1 2;\nN 6;\n"
-        "limits_enabled true;\nbasic_fog_enabled true;\nmat1_surface_color_gradient 0 ff0000 5000 00ff00;\n"
-        "aux_light_enabled_1 true;\nmain_light_alpha 10;\nbackground_color_1 0 0 ffff;",
-        "mandelbox_scale -1.5;",
-        "[fractal_2]\ntransf_scale_3 3;",
-    ).split("\n")
-    for _ in range(data.draw(st.integers(1, 3))):
-        place = data.draw(st.integers(0, len(lines) - 1))
-        kind = data.draw(st.sampled_from(("value", "drop", "twice", "letter", "cut")))
-        line = lines[place]
-        if kind == "value":
-            lines[place] = f"{line.partition(' ')[0]} {data.draw(st.sampled_from(WORDS))};"
-        elif kind == "drop":
-            lines[place] = ""
-        elif kind == "twice":
-            lines.insert(place, line)
-        elif kind == "letter" and line:
-            at = data.draw(st.integers(0, len(line) - 1))
-            lines[place] = line[:at] + data.draw(st.characters()) + line[at + 1 :]
-        elif kind == "cut":
-            lines[place] = line[: len(line) // 2]
-    try:
-        found = import_text("\n".join(lines), "x.fract")
-        text = found.text("x.fract")
-        assert all(remark.isprintable() or "\n" not in remark for remark in found.remarks)
-        load_scene(text)
-    except ClfractalError as error:
-        check_line(error)
 
 
 def test_the_examples_that_are_installed() -> None:
