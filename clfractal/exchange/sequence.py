@@ -57,6 +57,7 @@ class Plan:
     factors: tuple[float, ...]
     w: float
     mirrored: bool
+    repeats: tuple[float, ...]
     folds: Folds
     installed: Installed | None
     remarks: list[str]
@@ -165,6 +166,7 @@ def _plan(settings: Settings, suffix: str, installed: Installed | None, remarks:
         factors,
         w,
         is_mirrored(settings),
+        tuple(max(each, 0.0) for each in main.vector("repeat")),
         _folds(main),
         installed,
         remarks,
@@ -237,7 +239,7 @@ def _slot(settings: Settings, slot: int, remarks: list[str], *, hybrid: bool = F
 def _by_library(plan: Plan, slot: Slot) -> dict[str, Any] | None:
     """A formula alone that our library has; None if it has not."""
     found = counterpart(slot.number, plan.settings.fractal(slot.slot))
-    if plan.folds != NO_FOLDS:
+    if plan.folds != NO_FOLDS or any(plan.repeats):
         return None
     if isinstance(found, str) or (plan.w and found.four) or (plan.mirrored and not found.even):
         return None
@@ -264,16 +266,16 @@ def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
     links = _links(followed)
     if links is None:
         # Applications differ too often to be formulas of their own: one formula has their number, and what changes.
-        shift = int(any(each["add"] == "point" for each in followed))
+        shift = int(any(plan.repeats) or any(each["add"] == "point" for each in followed))
         followed, following = _all_followed(plan, slots, texts, order, following.changed, shift)
         links = _links(followed)
     if links is None:
         where = plan.settings.main.where(f"formula_{slots[0].slot}")
         raise FileError("applications differ too often for a chain of formulas", where)
-    standing = any(each["add"] == "point" for each in followed)
+    standing = any(plan.repeats) or any(each["add"] == "point" for each in followed)
     if standing:
         links = [
-            _standing(size, following.carrying({})),
+            following.standing(),
             *({**link, "start": link["start"] + 1, **_later(link)} for link in links),
         ]
     if size == 4 and plan.w:
@@ -301,7 +303,7 @@ def _all_followed(
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
         following = Following(
-            Space(four=four, mirrored=plan.mirrored), first, carried, shift, plan.folds, tube
+            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, tube
         )
         try:
             return _followed(plan, slots, texts, order, following), following
@@ -413,18 +415,3 @@ def _runs(
         found.append({**link, "stop": last} if stop else link)
         place = last
     return found
-
-
-def _standing(size: int, carrying: dict[str, Any]) -> dict[str, Any]:
-    """A formula that leaves z where it is, for one application: so an orbit begins at the point."""
-    names = ["x", "y", "z", "w"][:size]
-    formula = {
-        "title": "The point",
-        "variables": names,
-        "map": names,
-        "add": "none",
-        "degree": 1,
-        "bounds": {"radius": 0.001},
-        **(carrying or {"derivative": "dr"}),
-    }
-    return {"formula": formula, "count": 1, "start": 0, "stop": 1}

@@ -21,6 +21,8 @@ from clfractal.exchange.values import Values
 
 VARIABLES = ("x", "y", "z", "w")
 MAX_STEPS = 20_000
+MAX_TURNS = 24
+"""Of a loop whose end depends on z: it ends then."""
 _SCALARS = ("pos_neg", "cw", "actualScale", "actualScaleA", "temp1000", "addDist", "DE0", "dist")
 _UNSEEN = ("DE", "color", "colorHybrid", "pseudoKleinianDE", "r_dz")
 """What is for distances and colours, which are found in another way here."""
@@ -33,14 +35,25 @@ class Space:
     Attributes:
         four: whether there is a fourth one; else it is 0, and so is the point's.
         mirrored: whether our third axis points the other way than theirs.
+        repeats: after which lengths along each axis space is there once more; 0: it is not.
     """
 
     four: bool = True
     mirrored: bool = False
+    repeats: tuple[float, ...] = ()
 
     def point(self, symbols: Symbols) -> Vector:
         """The point in space as they have it, which does not change."""
-        return self.named(symbols, "point_")
+        return self.turned(symbols, [*self.begins(symbols, "point_"), 0.0][:4])
+
+    def begins(self, symbols: Symbols, before: str) -> list[Value]:
+        """A point of ours, in the part of space that repeats: as many variables as z has."""
+        found: list[Value] = [symbols.name(before + name) for name in VARIABLES[: 4 if self.four else 3]]
+        for place, length in enumerate(self.repeats):
+            if length > 0:
+                half = symbols.call("+", found[place], length / 2)
+                found[place] = symbols.call("-", symbols.call("mod", half, length), length / 2)
+        return found
 
     def named(self, symbols: Symbols, before: str = "") -> Vector:
         """Variables of ours as a vector of theirs."""
@@ -331,9 +344,13 @@ class Run(Values):
         if isinstance(condition, float):
             self.block(statement.blocks[0 if condition else 1])
             return
+        self.chosen(condition, statement.blocks)
+
+    def chosen(self, condition: Value | Nothing, blocks: Sequence[Sequence[Statement]]) -> None:
+        """Follows both of two blocks, and has of each variable what the condition chooses."""
         names, aux = self.names, self.aux
         ends = []
-        for block in statement.blocks:
+        for block in blocks:
             copies: dict[int, list[object]] = {}
             self.names = {name: _copied(value, copies) for name, value in names.items()}
             self.aux = {name: _copied(value, copies) for name, value in aux.items()}
@@ -361,12 +378,24 @@ class Run(Values):
     def _statement_loop(self, statement: Statement) -> None:
         start, step, body = statement.blocks
         self.follow(start)
+        going: Value = 1.0
+        turns = 0
         for _ in range(MAX_STEPS):
             condition = self.condition(statement.values[0]) if statement.values else 1.0
-            if not isinstance(condition, float):
-                self.refuse("a loop whose end depends on z")
-            if not condition:
+            if isinstance(condition, Nothing):
+                self.refuse("a loop whose end depends on nothing")
+            if condition == 0.0:
                 return
+            going = condition if isinstance(going, float) else self.symbols.both(going, condition)
+            if not isinstance(going, float):
+                turns += 1
+                if turns > MAX_TURNS:
+                    return
+                # What counts the turns goes on, as it may end the loop for all z.
+                self.chosen(going, (body if start else (*body, *step), ()))
+                if start:
+                    self.block(step)
+                continue
             try:
                 self.block(body)
             except _Left:

@@ -176,7 +176,9 @@ class Following:
     def _added(self, z: Sequence[Value], addition: Addition) -> tuple[list[Value], bool]:
         """The map, with what is added but what our language adds by itself; and whether that is the point."""
         call = self.symbols.call
-        here: list[Value] = [self.symbols.name(f"point_{name}") for name in VARIABLES[: len(z)]]
+        # Our language adds the point itself, and not that in the part of space that repeats.
+        raw: list[Value] = [self.symbols.name(f"point_{name}") for name in VARIABLES[: len(z)]]
+        here = self.space.begins(self.symbols, "point_")
         found = list(z)
         if addition.constant is not None:
             constant = self.space.turned(self.symbols, addition.placed(addition.constant))
@@ -191,7 +193,24 @@ class Following:
             else:
                 own = 1.0 - factors[place]
             found[place] = call("-", part, call("*", own, here[place]))
+            if here[place] is not raw[place]:
+                found[place] = call("+", found[place], call("-", here[place], raw[place]))
         return found, True
+
+    def standing(self) -> dict[str, Any]:
+        """A formula for one application, by which an orbit begins at the point, in the part of space that repeats."""
+        let, maps = written(self.space.begins(self.symbols, ""), "v")
+        formula = {
+            "title": "The point",
+            "variables": list(VARIABLES[: len(maps)]),
+            **({"let": dict(let)} if let else {}),
+            "map": maps,
+            "add": "none",
+            "degree": 1,
+            "bounds": {"radius": 0.001},
+            **(self.carrying({}) or {"derivative": "dr"}),
+        }
+        return {"formula": formula, "count": 1, "start": 0, "stop": 1}
 
 
 class NeedsFourError(Exception):

@@ -115,16 +115,47 @@ def test_a_julia_set_whose_formula_asks_for_the_point(tmp_path: Path) -> None:
     np.testing.assert_allclose(mapped(formula, POINTS, point), expected, rtol=1e-9, atol=1e-12)
 
 
+def test_space_that_repeats(tmp_path: Path) -> None:
+    """The orbit begins in the middle cell, and what is added is the point there."""
+    text = (
+        "REAL4 AIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux) { return z * 2.0f; }"
+    )
+    section = formula_of(program(tmp_path, xenodreambuie=text), "", "formula_1 11;\nrepeat 0 3 0.5;")
+    first, second = (each["inline"] for each in section["inline"]["chain"])
+    x, y, z = POINTS
+    cell = np.array([x, y - 3 * np.round(y / 3), z - 0.5 * np.round(z / 0.5)])
+    np.testing.assert_allclose(mapped(first, POINTS, 0 * POINTS), cell, atol=1e-12)
+    np.testing.assert_allclose(mapped(second, POINTS[::-1], POINTS), 2 * POINTS[::-1] + cell, atol=1e-12)
+    assert section["iterations"] == 10
+
+
+def test_a_loop_that_ends_by_z(tmp_path: Path) -> None:
+    text = """REAL4 AIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	while (z.x > 0.5f) z.x -= 1.0f;
+	for (int k = 0; k < 3 && z.y < 1.0f; k++) z.y = z.y * 2.0f + k;
+	return z;
+}
+"""
+    formula = formula_of(program(tmp_path, menger_mod1=text), "", "formula_1 61;")["inline"]
+    x, y, z = POINTS
+    for k in range(3):
+        y = np.where(y < 1, 2 * y + k, y)
+    expected = np.array([np.where(x > 0.5, x - np.ceil(x - 0.5), x), y, z])
+    np.testing.assert_allclose(mapped(formula, POINTS, 0 * POINTS), expected, atol=1e-12)
+
+
 @pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
 @pytest.mark.parametrize(
     "keys",
     [
         f"{SPONGE}\n{TURNED}\n{BOX}",
         f"{BULB}\n{TURNED}\njulia_mode true;\njulia_c -0.9 0.3 0.2;",
+        f"{SPONGE}\nrepeat 1.5 0 0;\nlimits_enabled true;\nlimit_min -1 -1 -1;\nlimit_max 1 1 1;",
         "boolean_operators true;\nformula_1 7;\nformula_2 7;\nN 4;\nformula_position_2 0.4 -0.5 0.6;\n"
         "formula_rotation_2 -35 62 110;\nformula_scale_2 0.6;",
     ],
-    ids=["sponge", "julia", "joined"],
+    ids=["sponge", "julia", "repeated", "joined"],
 )
 def test_turned_sets_in_both_programs(keys: str, tmp_path: Path) -> None:
     path = tmp_path / "turned.fract"
