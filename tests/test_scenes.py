@@ -85,7 +85,7 @@ FILLED = (
     *("stereo_hall", "mandelbox_inside", "film_dive", "kleinian_grove", "lantern", "mandelbox_cave"),
     *("menger_hall", "museum", "riemann_sphere", "studio_julia", "wet_street", "three_trees"),
     *("twisted_box", "lamp_room", "lamplit_shells", "amazing_box_vary", "glass_marbles", "star_cut"),
-    *("stereo_bulb", "stereo_hast"),
+    *("aexion", "cosine_mandelbulb", "stereo_bulb", "stereo_hast"),
 )
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
