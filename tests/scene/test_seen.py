@@ -129,7 +129,7 @@ def test_a_picture_is_filled() -> None:
     """Of a set that fills a third of its bounds."""
     found = load_scene(
         SCENES / "turned_chain.yaml",
-        overrides=["camera.frame=seen", "image={width: 160, height: 90}"],
+        overrides=["camera.frame=seen", "image={width: 160, height: 90}", "objects={}"],
     )
     with clfractal.Engine() as engine:
         picture = engine.render(found, samples=1, channels=("A",))
