@@ -35,11 +35,23 @@ from typing import Any
 SCENES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "mandelbulb": ("mandelbulb.yaml", ()),
     "hast": ("hast_rotated.yaml", ()),
-    "mandelbox": ("mandelbox.yaml", ()),
+    "mandelbox": (
+        "mandelbox.yaml",
+        (
+            "lighting={mode: direct}",
+            "objects={}",
+            "fog=null",
+            "camera={position: [4.0, -6.0, 3.2], target: [0.15, 0, -0.6], fov: 49}",
+            "coloring={by: trap, trap: {shape: point}, scale: 0.5}",
+            "renderer={samples: 9, ambient_occlusion: {rays: 2, distance: 0.6}}",
+            "lights=[{direction: [-1.0, 0.35, -0.55], angular_size: 1}, {direction: [0.3, 1, -0.1], shadow: false}]",
+        ),
+    ),
     "volume": (
         "volume_jade.yaml",
         (
             "lighting={mode: direct}",
+            "objects={}",
             "renderer={type: volume, box: {size: 2.8}, resolution: 256, value: coverage, store: float, shadows: true, "
             "samples: 4, transfer: {opacity: [{at: 0.05, opacity: 0}, {at: 0.4, opacity: 0.2}, {at: 1.0, opacity: 0.6}]}}",
         ),
