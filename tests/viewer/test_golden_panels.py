@@ -53,7 +53,7 @@ def draw_help(ui: Ui) -> None:
 
 CASES: dict[str, tuple[str, Callable[[Ui], None], Callable[[Ui], None] | None]] = {
     "dock": ("mandelbulb", scene_dock.draw, None),
-    "colouring": ("stereo_bulb", scene_dock.draw, opened("coloring", "material")),
+    "colouring": ("mandelbulb", scene_dock.draw, opened("coloring", "material")),
     "lights": ("mandelbulb", scene_dock.draw, opened("lights", "camera")),
     "cut_planes": ("figure9", scene_dock.draw, opened("cut_planes", "stereo")),
     "objects": ("mandelbulb", scene_dock.draw, with_objects),
