@@ -27,6 +27,8 @@ NODE_NUMBERS = 21
 """Middle and radius of a ball; strength with and without distance; axis, cosine and sine of the angle about it in which
 lamps shine as along their own axes, cosine of what they shine beyond it; lowest and highest corner of a box; number of the
 node behind its last one; number of its first lamp; whether rays meet any of them."""
+ALL_AROUND = 2.0
+"""In the place of the last cosine of the root: all lamps shine all around, so that no node has to be asked for its axis."""
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # ITU-R BT.709-6, item 3.2
 # Boxes are wider by so much of their coordinates and size, since float32 rounds them.
 _WIDER = 4e-7
@@ -123,6 +125,8 @@ def tree(rows: Doubles) -> tuple[list[int], Floats]:
             todo += [len(nodes), second, first]
             nodes.append(node)
     found = np.array(nodes)
+    if rows[:, 9].max() <= -1:
+        found[0, 11] = ALL_AROUND
     # (A box may be flat.)
     wide = _WIDER * (np.abs(found[:, 12:18]).max(axis=1) + found[:, 3])[:, None]
     found[:, 12:15] -= wide

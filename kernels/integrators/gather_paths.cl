@@ -57,7 +57,7 @@ STAGE(end_paths) {
     if (!HAS(w, SOUGHT)) counters_met(&cost, last, 0);
     mask on_path = mask_of(so_far.on_path);
     on_path &= ~is_within_set(&with, w);
-    real far = pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST));
+    real far = pick(on_path, pick(mask_of(last.hit), last.t, (real)(REAL_LARGEST)), R(0.0));
     light_hit before = light_hit_of(so_far.origin, so_far.direction, 0, &far, w);
     before.met &= on_path;
     if (HAS(w, GLASS)) path_absorbs(&so_far, &with, far, on_path, w);

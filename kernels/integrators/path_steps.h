@@ -146,7 +146,7 @@ INLINE void path_widens(stage s, path *so_far, const interaction *here, ray from
 // has `halted` it before.
 INLINE mask path_arrives(stage s, path *so_far, const path_state *with, interaction *found, ray arrived, real picture_y, mask halted, world w) {
     const mask on_path = mask_of(so_far->on_path) & ~halted;
-    real far = way_to_interaction(found, arrived);
+    real far = pick(on_path, way_to_interaction(found, arrived), R(0.0));
     light_hit before = light_hit_of(arrived.origin, arrived.direction, s.bounce == 0, &far, w);
     before.met &= on_path;
     const mask lands = on_path & mask_of(found->found) & ~before.met;

@@ -5,10 +5,17 @@ typedef struct {
     real strength;   // intensity after falloff
 } incidence;
 
-// From a place.
+// From a place, with a strength of 1; and the square of the distance.
+INLINE incidence incidence_from(vec place, vec point, real *square) {
+    const vec offset = vec_sub(place, point);
+    *square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
+    return (incidence){vec_normalize(offset), sqrt(*square), R(1.0)};
+}
+
 INLINE incidence light_from_place(light_record light, vec point) {
     const real bright = (real)(light->intensity);
-    const vec offset = vec_sub(vec_splat(light->vector), point);
-    const real square = fmax(vec_dot(offset, offset), (real)(REAL_SMALLEST));
-    return (incidence){vec_normalize(offset), sqrt(square), light->inverse_square ? bright / square : bright};
+    real square;
+    incidence in = incidence_from(vec_splat(light->vector), point, &square);
+    in.strength = light->inverse_square ? bright / square : bright;
+    return in;
 }

@@ -63,10 +63,12 @@ INLINE real tree_lamp_weighs(real number, const vec *from, mask here, world w) {
 // The same as below, of the lights on a set.
 INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *shows, real *density, real *weight, world w);
 
-// The nearest light that a ray meets before `far`, its number, or -1; the eye's own rays see only visible ones.
+// The nearest light that a ray meets before `far`, which is 0 of lanes for which nobody asks. The eye's own rays see only visible ones, of
+// which nobody asks what they weigh.
 CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     const int singles = w.settings->single_lights, nodes = w.settings->tree_nodes;
     mask met = less(R(1.0), R(0.0)), of_tree = met;
+    if (!any_lane(less(R(0.0), *far))) return met;
     real number = R(0.0);
     vec inverse = *direction;
     if (nodes > 0) inverse = vec_of(tree_inverse(direction->x), tree_inverse(direction->y), tree_inverse(direction->z));
@@ -92,7 +94,7 @@ CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, r
             of_tree |= here;
         }
     }
-    if (any_lane(of_tree)) *weight = pick(of_tree, tree_lamp_weighs(number, origin, of_tree, w), *weight);
+    if (!of_eye && any_lane(of_tree)) *weight = pick(of_tree, tree_lamp_weighs(number, origin, of_tree, w), *weight);
     return met | met_on_set(*origin, *direction, of_eye, far, shows, density, weight, w);
 }
 

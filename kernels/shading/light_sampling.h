@@ -1,6 +1,8 @@
 // How paths sample lights, whatever they leave: a surface or a place in a medium. What a path could also have met by chance is weighed by the
 // power heuristic (Veach and Guibas 1995).
 
+#include "shading/lane_lamps.h"
+
 // Lights beside those that are listed: what they add to the sum of all weights, and the one of them that is chosen, if one is.
 INLINE real with_lights_beside(real sum, vec point, real own, world w);
 INLINE void sample_lights_beside(choosing *c, const real *numbers, world w);
@@ -62,9 +64,22 @@ INLINE int next_chosen(real number, mask *left, mask *here) {
     return i;
 }
 
+// Lanes that have chosen points or balls ask all of these together; the result says which they are.
+INLINE mask sample_chosen_lamps(choosing *c, real u, real v, world w) {
+    const mask asks = less_equal(R(0.0), c->number);
+    const lane_lamp lamp = lane_lamp_of(c->number, asks, w.lights);
+    const mask ball = mask_of(lamp.ball), here = ball | mask_of(lamp.point);
+    if (!any_lane(here)) return here;
+    takes(c, here, lane_lamp_sample(&lamp, c->from, c->point, u, v), c->weight);
+    c->found.both |= ball;
+    c->found.unblocked |= here & ~mask_of(lamp.shadow);
+    return here;
+}
+
 // A place of the light that was chosen.
 INLINE void sample_chosen(choosing *c, real u, real v, world w) {
     mask left = less(R(0.0), R(1.0)), here;
+    if (w.settings->tree_nodes > 0) left = ~sample_chosen_lamps(c, u, v, w);
     for (int i; (i = next_chosen(c->number, &left, &here)) >= 0;) {
         light_record light = w.lights + i;
         takes(c, here, light_sample(light, light->seen ? c->from : c->point, u, v, w.tables), c->weight);
@@ -108,7 +123,8 @@ INLINE choosing choose_light(vec point, vec from, vec normal, real own, const re
 // The same as far as no other light is before it: lights hide what is behind them. (What is sought is found before that is known.)
 INLINE sampled_light sample_one_light(vec point, vec from, vec normal, real own, const real *numbers, real total, world w) {
     choosing c = choose_light(point, from, normal, own, numbers, total, w);
-    real far = pick(less(R(0.0), c.found.sought), R(0.0), c.found.ray.distance * R(0.999));
+    const mask dark = ~less(R(0.0), brightest(c.found.ray.light));
+    real far = pick(dark | less(R(0.0), c.found.sought), R(0.0), c.found.ray.distance * R(0.999));
     const light_hit hides = light_hit_of(c.begin, c.found.ray.toward, 0, &far, w);
     c.found.ray.light = color_pick(hides.met, color_of(R(0.0), R(0.0), R(0.0)), c.found.ray.light);
     return c.found;

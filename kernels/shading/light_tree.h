@@ -5,6 +5,7 @@
 
 #define TREE_NODE 21
 enum { TREE_MIDDLE = 0, TREE_RADIUS = 3, TREE_POWER, TREE_STEADY, TREE_AXIS, TREE_CORE = 9, TREE_BEYOND = 11, TREE_LOW, TREE_HIGH = 15, TREE_END = 18, TREE_LAMP, TREE_SEEN };
+#define IS_BEAMED(tree) ((tree)[TREE_BEYOND] < 2.0f)
 #define TREE_BEHIND R(0.05)   // of a place that faces a node what one has that does not: light comes through surfaces, too
 
 // An angle up to half a turn.
@@ -36,15 +37,15 @@ typedef struct {
 INLINE tree_weight tree_weight_of(__global const float *tree, ints node, vec from, vec normal) {
     const vec offset = vec_sub(tree_vec(tree, node, TREE_MIDDLE), from);
     const real radius = gather_floats(tree, node + TREE_RADIUS), reach = radius * radius;
-    const real square = most(vec_dot(offset, offset), (real)(REAL_SMALLEST));
-    const vec toward = vec_scale(offset, R(1.0) / sqrt(square));
+    const real square = most(vec_dot(offset, offset), (real)(REAL_SMALLEST)), inverse = real_rsqrt(square);
+    const vec toward = vec_scale(offset, inverse);
     // The angle of the ball in which they stand: from within it may be any.
-    const real share = least(reach / square, R(1.0));
+    const real sine = least(radius * inverse, R(1.0));
     const mask outside = less(reach, square);
-    const tree_angle spread = {pick(outside, sqrt(R(1.0) - share), R(-1.0)), pick(outside, sqrt(share), R(0.0))};
+    const tree_angle spread = {pick(outside, sqrt(R(1.0) - sine * sine), R(-1.0)), pick(outside, sine, R(0.0))};
     real shines = R(1.0);
-    // (Most lamps shine all around: they have no axis to ask for.)
-    const real even = gather_floats(tree, node + TREE_CORE);
+    // (Most lamps shine all around: a tree of such alone says so at its root, and has no axis to ask for.)
+    const real even = IS_BEAMED(tree) ? gather_floats(tree, node + TREE_CORE) : R(-1.0);
     if (any_lane(less(R(-1.0), even))) {
         const tree_angle core = {even, gather_floats(tree, node + TREE_CORE + 1)};
         const vec axis = tree_vec(tree, node, TREE_AXIS);
@@ -52,7 +53,8 @@ INLINE tree_weight tree_weight_of(__global const float *tree, ints node, vec fro
         shines = pick(less_equal(gather_floats(tree, node + TREE_BEYOND), beyond.cosine), most(beyond.cosine, R(0.0)), R(0.0));
     }
     tree_weight found;
-    found.all = shines * (gather_floats(tree, node + TREE_STEADY) + gather_floats(tree, node + TREE_POWER) / most(square, reach));
+    const real steady = tree[TREE_STEADY] > 0.0f ? gather_floats(tree, node + TREE_STEADY) : R(0.0);
+    found.all = shines * (steady + gather_floats(tree, node + TREE_POWER) / most(square, reach));
     const real faces = most(tree_without(tree_between(normal, toward), spread).cosine, R(0.0));
     found.facing = found.all * pick(less(R(0.5), vec_dot(normal, normal)), TREE_BEHIND + faces, R(1.0));
     return found;
@@ -89,7 +91,8 @@ CALLED tree_choice tree_descent(const vec *from, const vec *normal, int known, r
         const real left = tree_part(a.facing, b.facing), right = tree_part(b.facing, a.facing);
         const mask goes_right = known ? less_equal(gather_floats(tree, second + TREE_LAMP), place) : less_equal(left, place);
         found.share = pick(inner, found.share * pick(goes_right, right, left), found.share);
-        found.even = pick(inner, found.even * pick(goes_right, tree_part(b.all, a.all), tree_part(a.all, b.all)), found.even);
+        const real even = tree_part(pick(goes_right, b.all, a.all), pick(goes_right, a.all, b.all));
+        found.even = pick(inner, found.even * even, found.even);
         const real rest = pick(goes_right, place - left, place) / most(pick(goes_right, right, left), (real)(REAL_SMALLEST));
         if (!known) place = pick(inner, bounded(rest, R(0.0), R(1.0) - (real)(REAL_EPSILON)), place);
         node = pick_ints(inner, pick_ints(goes_right, second, first), node);
