@@ -68,12 +68,11 @@ INLINE mask met_on_set(vec origin, vec direction, int of_eye, real *far, color *
 CALLED mask nearest_light(const vec *origin, const vec *direction, int of_eye, real *far, color *shows, real *density, real *weight, world w) {
     const int singles = w.settings->single_lights, nodes = w.settings->tree_nodes;
     mask met = less(R(1.0), R(0.0)), of_tree = met;
-    if (!any_lane(less(R(0.0), *far))) return met;
     real number = R(0.0);
     vec inverse = *direction;
     if (nodes > 0) inverse = vec_of(tree_inverse(direction->x), tree_inverse(direction->y), tree_inverse(direction->z));
     lamp_turn turn = {0, 0};
-    for (;;) {
+    while (any_lane(less(R(0.0), *far))) {
         mask asks;
         const int i = next_lamp(&turn, singles, nodes, LIGHT_TREE(w), *origin, inverse, *far, &asks);
         if (i < 0) break;
