@@ -39,7 +39,8 @@ def vectorises_what_is_wide(info: DeviceInfo) -> bool:
     """Whether a compiler makes one loop of neighbouring work-items whose packets fill the vector unit already.
 
     Intel's does (2026.22). Of kernels with many branches that takes minutes: `scatter_paths` takes 24 s without it
-    and more than 600 with it, all programs of a surface 3 times as long; pictures take the same time: packets do the work.
+    and more than 600 with it, all programs of a surface 3 times as long. Packets do the work: pictures of two scenes took
+    about as long.
     So its kernels have the attribute `intel_vec_len_hint`, as part of the word `__kernel`.
     """
     return is_intel_cpu(info)

@@ -266,13 +266,13 @@ def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
     links = _links(followed)
     if links is None:
         # Applications differ too often to be formulas of their own: one formula has their number, and what changes.
-        shift = int(any(plan.repeats) or any(each["add"] == "point" for each in followed))
+        shift = int(_begins_at_point(plan, followed))
         followed, following = _all_followed(plan, slots, texts, order, following.changed, shift)
         links = _links(followed)
     if links is None:
         where = plan.settings.main.where(f"formula_{slots[0].slot}")
         raise FileError("applications differ too often for a chain of formulas", where)
-    standing = any(plan.repeats) or any(each["add"] == "point" for each in followed)
+    standing = _begins_at_point(plan, followed)
     if standing:
         links = [
             following.standing(),
@@ -283,6 +283,11 @@ def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
             link["formula"] = {**link["formula"], "slice": {"w": plan.w}}
     plan.settings.origins.extend(_origins(slots, texts))
     return measured(links, plan.most + standing, plan.settings)
+
+
+def _begins_at_point(plan: Plan, followed: Sequence[dict[str, Any]]) -> bool:
+    """Whether orbits need an application of their own to begin where theirs do."""
+    return any(plan.repeats) or any(each["add"] == "point" for each in followed)
 
 
 def _all_followed(

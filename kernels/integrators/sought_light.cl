@@ -9,13 +9,16 @@ INLINE color sought_shines(stage s, const interaction *here, world w) {
     return color_scale(p.emission_color, p.emission_luminance);
 }
 
-// What a ray in search of light brings from there, unless a lamp is before it.
-INLINE color sought_brings(stage s, int turn, const interaction *found, const sought *seeks, mask *lit, world w) {
+// What a ray in search of light brings from what `find_sought` has found, unless a lamp is before it: no lane is `lit` else.
+INLINE color sought_brings(stage s, int turn, const sought *seeks, mask *lit, world w) {
+    const interaction found = interaction_kept(s, 1);
+    *lit = mask_of(found.found);
+    if (!any_lane(*lit)) return color_of(R(0.0), R(0.0), R(0.0));
     const ray r = queue_ray(s.q, turn, s.slot);
-    real far = way_to_interaction(found, r);
+    real far = way_to_interaction(&found, r);
     const real way = pick(*lit, far, R(0.0));
     *lit &= ~light_hit_of(r.origin, r.direction, 0, &far, w).met;
-    const color brings = color_mul(seeks->brings, sought_shines(s, found, w));
+    const color brings = color_mul(seeks->brings, sought_shines(s, &found, w));
     return HAS(w, GLASS) ? absorbed(brings, seeks->extinction, way) : brings;
 }
 
@@ -50,10 +53,9 @@ STAGE(gather_sought_air) {
     STAGE_BEGINS(s, w);
     STATE_KEPT(s, sought, seeks, STATE_SOUGHT);
     if (!any_lane(less(R(0.0), seeks.thing))) return;
-    const interaction found = interaction_kept(s, 1);
-    mask lit = mask_of(found.found);
+    mask lit;
+    const color brings = sought_brings(s, next_turns, &seeks, &lit, w);
     if (any_lane(lit)) {
-        const color brings = sought_brings(s, next_turns, &found, &seeks, &lit, w);
         color light;
         STATE_RECALL_ONE(s, light, STATE_AIR, 1 + w.settings->air_sun);
         light = color_pick(lit, color_add(light, brings), light);
@@ -77,10 +79,9 @@ STAGE(gather_sought) {
     STAGE_BEGINS(s, w);
     STATE_KEPT(s, sought, seeks, STATE_SOUGHT);
     if (!any_lane(less(R(0.0), seeks.thing))) return;
-    const interaction found = interaction_kept(s, 1);
-    mask lit = mask_of(found.found);
+    mask lit;
+    color brings = sought_brings(s, next_turns, &seeks, &lit, w);
     if (any_lane(lit)) {
-        color brings = sought_brings(s, next_turns, &found, &seeks, &lit, w);
         if (bounce > 0) brings = limited(brings, w.settings);
         STATE_KEPT(s, path, so_far, STATE_PATH);
         so_far.seen = color_pick(lit, color_add(so_far.seen, brings), so_far.seen);

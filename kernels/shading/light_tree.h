@@ -5,7 +5,7 @@
 
 #define TREE_NODE 21
 enum { TREE_MIDDLE = 0, TREE_RADIUS = 3, TREE_POWER, TREE_STEADY, TREE_AXIS, TREE_CORE = 9, TREE_BEYOND = 11, TREE_LOW, TREE_HIGH = 15, TREE_END = 18, TREE_LAMP, TREE_SEEN };
-#define IS_BEAMED(tree) ((tree)[TREE_BEYOND] < 2.0f)
+#define IS_BEAMED(tree) ((tree)[TREE_BEYOND] < 2.0f)   // ALL_AROUND in clfractal/shading/light_tree.py
 #define TREE_BEHIND R(0.05)   // of a place that faces a node what one has that does not: light comes through surfaces, too
 
 // An angle up to half a turn.

@@ -62,6 +62,13 @@ def test_what_is_around_a_turned_set() -> None:
     assert not any("fractal_" in remark for remark in found.remarks)
 
 
+def test_a_sky_that_does_not_turn_is_told() -> None:
+    text = settings(f"{CAMERA}\n{SPONGE}\n{TURNED}")
+    told = import_text(text, "x.fract", look="ours").remarks
+    assert [each for each in told if each.startswith("fractal_rotation: the light of the sky")]
+    assert not import_text(text, "x.fract").remarks
+
+
 def test_a_set_that_stays_has_no_place_of_its_own() -> None:
     assert placing_of(parse_settings(settings(f"{CAMERA}\nfractal_rotation 0 0 0;"), "x.fract")) is None
 
