@@ -26,6 +26,8 @@ Place = tuple[slice, slice]
 
 # Of one eye's picture: a composed one has no camera of its own.
 _OF_AN_EYE = ("worldToCamera", "worldToNDC", "view")
+# Of the tiles of one picture: several have other tiles together, though they may be told alike.
+_OF_TILES = ("tileDevices",)
 
 
 def composed_channels(stereo: Stereo, channels: Sequence[str]) -> tuple[str, ...]:
@@ -180,12 +182,13 @@ class Composed:
 
 
 def agreed_header(headers: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """What all of some pictures' headers tell alike."""
+    """What all of some pictures' headers tell alike, and what is so of the picture that they make."""
     first, *others = headers
     return {
         key: value
         for key, value in first.items()
-        if all(key in other and np.array_equal(other[key], value) for other in others)
+        if not (others and key in _OF_TILES)
+        and all(key in other and np.array_equal(other[key], value) for other in others)
     }
 
 

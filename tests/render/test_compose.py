@@ -202,7 +202,14 @@ def test_an_eye_alone_is_passed_on_as_it_is() -> None:
 def test_headers_tell_what_both_pictures_do() -> None:
     common = {"scene": "version: 1\n", "device": "PoCL", "transparent": True}
     headers = [
-        {**common, "worldToCamera": np.eye(4), "worldToNDC": np.eye(4), "view": view, "seconds": seconds}
+        {
+            **common,
+            "worldToCamera": np.eye(4),
+            "worldToNDC": np.eye(4),
+            "view": view,
+            "seconds": seconds,
+            "tileDevices": "1*1",
+        }
         for view, seconds in (("left", 1.0), ("right", 2.0))
     ]
     left, right = (Framebuffer(CHANNELS, (8, 8), header=header) for header in headers)
@@ -300,8 +307,14 @@ def test_any_views_in_any_region(drawn: tuple[list[Place], tuple[int, int], Regi
 def test_headers_tell_what_all_views_do_and_the_time_of_all() -> None:
     places = [Place(0, 0, 4, 4), Place(4, 0, 4, 4)]
     headers = [
-        {"scene": "version: 1\n", "worldToCamera": np.eye(4), "seconds": 1.5, "view": "left"},
-        {"scene": "version: 1\n", "worldToCamera": np.eye(4), "seconds": 2.0, "view": "right"},
+        {
+            "scene": "version: 1\n",
+            "worldToCamera": np.eye(4),
+            "seconds": seconds,
+            "view": view,
+            "tileDevices": "1*2",
+        }
+        for seconds, view in ((1.5, "left"), (2.0, "right"))
     ]
     stores = [Framebuffer(FILLED, (4, 4), header=header) for header in headers]
     picture = Pasted(stores, places, (8, 4), Region(0, 0, 8, 4), FILL, {"version": "0.1.0"})
