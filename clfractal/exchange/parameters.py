@@ -129,9 +129,9 @@ class Parameters:
         if name == "mboxFactor1":
             return outer / inner if inner else 0.0
         if name == "mainRot":
-            return rotation_of_box(self.read("mandelbox_rotation_main"))
+            return rotation(self.read("mandelbox_rotation_main"))
         if name in ("rot", "rotinv") and len(indices) == 2:
-            found = rotation_of_box(
+            found = rotation(
                 self.read(f"mandelbox_rotation_{('neg', 'pos')[indices[0]]}_{indices[1] + 1}")
             )
             return found if name == "rot" else transposed(found)
@@ -139,14 +139,13 @@ class Parameters:
 
     def _of_ifs(self, name: str, indices: Sequence[int]) -> Found | None:
         if name == "mainRot":
-            return rotation(self.read("IFS_rotation"), reverse=True)
+            return _rotation_of_ifs(self.read("IFS_rotation"))
         if name == "edge":
-            on = _scalar(self.read("IFS_edge_enabled"))
-            return self.read("IFS_edge") if on else (0.0,) * 4
+            return self.read("IFS_edge")  # whether or not `IFS_edge_enabled` stands there
         if len(indices) == 1:
             number = indices[0]
             if name == "rot":
-                return rotation(self.read(f"IFS_rotations_{number}"), reverse=True)
+                return _rotation_of_ifs(self.read(f"IFS_rotations_{number}"))
             if name == "direction":
                 found = self.read(f"IFS_direction_{number}")
                 assert isinstance(found, tuple)
@@ -157,25 +156,16 @@ class Parameters:
         return None
 
 
-def rotation_of_box(angles: Found) -> Matrix:
-    """The matrix of the Mandelbox's angles in degrees, about x, y and z: Rx Ry Rz."""
-    x, y, z = (_about(axis, angle) for axis, angle in enumerate(_radians(angles)))
-    return times(times(x, y), z)
-
-
-def rotation_of_set(angles: Found) -> Matrix:
-    """The matrix of three angles in degrees by which sets are turned, about x, y and z: Rz Ry Rx."""
+def rotation(angles: Found) -> Matrix:
+    """The matrix of three angles in degrees, about x, y and z: Rz Ry Rx, as depths of theirs show."""
     x, y, z = (_about(axis, angle) for axis, angle in enumerate(_radians(angles)))
     return times(times(z, y), x)
 
 
-def rotation(angles: Found, *, reverse: bool = False) -> Matrix:
-    """The matrix of three angles in degrees, about z, x and y: Rz Rx Ry, or in reverse Ry Rx Rz."""
-    first, second, third = _radians(angles)
-    about_z, about_x, about_y = _about(2, first), _about(0, second), _about(1, third)
-    if reverse:
-        return times(times(about_y, about_x), about_z)
-    return times(times(about_z, about_x), about_y)
+def _rotation_of_ifs(angles: Found) -> Matrix:
+    """The same of kaleidoscopic sets, whose angles are about z, y and x."""
+    assert isinstance(angles, tuple)
+    return rotation((*angles[2::-1], 0.0))
 
 
 def _radians(angles: Found) -> tuple[float, float, float]:

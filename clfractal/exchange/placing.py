@@ -11,7 +11,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from clfractal.exchange.parameters import Matrix, rotation_of_set, times, transposed
+from clfractal.exchange.parameters import Matrix, rotation, times, transposed
 from clfractal.exchange.settings import Settings
 
 _ORIGIN = (0.0, 0.0, 0.0)
@@ -40,7 +40,7 @@ def placing_of(settings: Settings) -> Placing | None:
     angles, position = settings.main.vector("fractal_rotation"), settings.main.vector("fractal_position")
     if not any((*angles, *position)):
         return None
-    return Placing(rotation_of_set(angles), position)
+    return Placing(rotation(angles), position)
 
 
 def place_around(scene: dict[str, Any], placing: Placing, beside: Sequence[str]) -> None:

@@ -14,7 +14,7 @@ from clfractal.errors import FileError, Where
 from clfractal.exchange.counterparts import counterpart
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
-from clfractal.exchange.parameters import rotation_of_set
+from clfractal.exchange.parameters import rotation
 from clfractal.exchange.placing import angles_of
 from clfractal.exchange.settings import SLOTS, Section, Settings
 from clfractal.exchange.translate import NO_FOLDS, Folds, KeepsError, Space
@@ -139,7 +139,7 @@ def joined_of(settings: Settings, installed: Installed | None, remarks: list[str
             "scale": size,
             "join": joins,
         }
-        angles = angles_of(rotation_of_set(main.vector(f"formula_rotation_{slot}")))
+        angles = angles_of(rotation(main.vector(f"formula_rotation_{slot}")))
         if any(angles):
             placed["rotation"] = angles
         found[f"formula {slot}"] = placed

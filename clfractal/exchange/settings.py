@@ -18,6 +18,8 @@ from clfractal.files.regular import read_bytes
 FIRST = "# Mandelbulber settings file"
 NEWEST = (2, 34)
 """The newest version whose keys are known."""
+_TURNS_BY_CHOICE = (2, 7)
+"""Kaleidoscopic sets of older files turn whether or not a key says so."""
 
 MAX_BYTES = 8_000_000
 MAX_LINES = 200_000
@@ -207,6 +209,10 @@ def parse_settings(text: str, file: str) -> Settings:
             _note_entry(line, number, section, found)
     if found.version is None:
         found.remarks.append("the version is not told; read as one of 2.00 to 2.34")
+    elif found.version < _TURNS_BY_CHOICE:
+        for each in found.sections.values():
+            if "IFS_rotation" in each.entries:
+                each.entries["IFS_rotation_enabled"] = Entry("true", each.entries["IFS_rotation"].line)
     return found
 
 

@@ -79,7 +79,7 @@ def _material(main: Section, key: str, name: str) -> dict[str, Any]:
 
 def _placed(main: Section, key: str, kind: str, along: float = 0.0, **numbers: Any) -> dict[str, Any]:
     """An object with its place and rotation; `along` is how far its middle is from theirs, on its own z axis."""
-    matrix = rotation(main.vector(key + "rotation"), reverse=True)
+    matrix = rotation(main.vector(key + "rotation"))
     place = main.vector(key + "position")
     found: dict[str, Any] = {
         "type": kind,
@@ -93,7 +93,7 @@ def _placed(main: Section, key: str, kind: str, along: float = 0.0, **numbers: A
 
 
 def _flat(main: Section, key: str, kind: str) -> dict[str, Any]:
-    matrix = rotation(main.vector(key + "rotation"), reverse=True)
+    matrix = rotation(main.vector(key + "rotation"))
     found: dict[str, Any] = {"type": kind, "position": list(main.vector(key + "position"))}
     normal = [round(each, 9) + 0.0 for each in matrix[2]]
     return found if normal == [0, 0, 1] else {**found, "normal": normal}

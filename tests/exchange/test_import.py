@@ -329,7 +329,7 @@ class TestSolids:
         )
         box = load_scene(imported(f"{CAMERA}\n{keys}").scene).objects["box 1"]
         assert isinstance(box, BoxObject)
-        theirs = np.array(rotation((20.0, -35.0, 50.0, 0.0), reverse=True))
+        theirs = np.array(rotation((20.0, -35.0, 50.0, 0.0)))
         for point in np.random.default_rng(1).normal(size=(200, 3)):
             inside = bool(np.all(np.abs(theirs @ point) <= np.array([0.5, 1, 1.5])))
             assert box.holds(tuple(point)) == inside

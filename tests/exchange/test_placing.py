@@ -55,7 +55,7 @@ def test_what_is_around_a_turned_set() -> None:
     np.testing.assert_allclose(shines["position"], turn @ ([3, 0.5, 1] - place))
     box = load_scene(found.scene).objects["box 1"]
     assert isinstance(box, BoxObject)
-    own = np.array(rotation((20.0, -35.0, 50.0, 0.0), reverse=True))
+    own = np.array(rotation((20.0, -35.0, 50.0, 0.0)))
     for point in np.random.default_rng(1).normal(size=(300, 3)) * 0.5 + [0.9, -0.7, -0.4]:
         inside = bool(np.all(np.abs(own @ (point - [0.9, -0.7, -0.4])) <= [0.15, 0.3, 0.45]))
         assert box.holds(tuple(turn @ (point - place))) == inside

@@ -399,25 +399,21 @@ def test_fields_are_found_by_keys_of_other_spellings() -> None:
 
 
 def test_angles_of_matrices() -> None:
-    """About x, y and z for the Mandelbox; about z, x and y for all else, as silhouettes of theirs have shown."""
-    from clfractal.exchange.parameters import rotation_of_box
-
+    """About x, y and z, and about z, y and x for kaleidoscopic sets, as depths of theirs show."""
     quarter = {
         "x": [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
         "y": [[0, 0, 1], [0, 1, 0], [-1, 0, 0]],
         "z": [[0, -1, 0], [1, 0, 0], [0, 0, 1]],
     }
     about = {axis: np.array(matrix) for axis, matrix in quarter.items()}
-    angles = (90.0, 90.0, 90.0, 0.0)
-    np.testing.assert_allclose(rotation_of_box(angles), about["x"] @ about["y"] @ about["z"], atol=1e-12)
-    np.testing.assert_allclose(rotation(angles), about["z"] @ about["x"] @ about["y"], atol=1e-12)
-    np.testing.assert_allclose(
-        rotation(angles, reverse=True), about["y"] @ about["x"] @ about["z"], atol=1e-12
-    )
-    for place, (box, other) in enumerate(zip("xyz", "zxy", strict=True)):
+    np.testing.assert_allclose(rotation((90.0,) * 4), about["z"] @ about["y"] @ about["x"], atol=1e-12)
+    for place, (axis, of_ifs) in enumerate(zip("xyz", "zyx", strict=True)):
         one = tuple(90.0 if place == each else 0.0 for each in range(4))
-        np.testing.assert_allclose(rotation_of_box(one), about[box], atol=1e-12)
-        np.testing.assert_allclose(rotation(one), about[other], atol=1e-12)
+        np.testing.assert_allclose(rotation(one), about[axis], atol=1e-12)
+        text = settings("", "IFS_rotation {} {} {};".format(*one))
+        turned = Parameters(parse_settings(text, "x").fractal(1), {}).value("IFS.mainRot")
+        np.testing.assert_allclose(np.array(turned), about[of_ifs], atol=1e-12)
+
 
 
 def test_symbols_are_written_with_as_few_brackets_as_they_need() -> None:
