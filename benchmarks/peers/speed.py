@@ -44,7 +44,9 @@ HEAD = f"{'file':58} {'theirs':>8} {'ours':>8} {'ratio':>6} {'first':>8}"
 
 def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="speed", description=__doc__.split("\n", 1)[0] if __doc__ else None)
-    parser.add_argument("files", nargs="*", type=Path, metavar="FILE", help="settings; without: examples that open")
+    parser.add_argument(
+        "files", nargs="*", type=Path, metavar="FILE", help="settings; without: examples that open"
+    )
     parser.add_argument("--sample", type=int, default=12, metavar="N", help="so many of them, at random")
     parser.add_argument("--seed", type=int, default=1, metavar="S", help="which ones")
     parser.add_argument("--size", default="1280x720", metavar="WxH")
@@ -52,7 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=300, metavar="S", help="what a picture may take")
     options = parser.parse_args(arguments)
     if not theirs.is_there():
-        print("Mandelbulber 2 is not installed (apt-get install mandelbulber2): there is nothing to compare with")
+        print(
+            "Mandelbulber 2 is not installed (apt-get install mandelbulber2): there is nothing to compare with"
+        )
         return 2
     width, height = (int(each) for each in options.size.split("x"))
     print(HEAD)
@@ -68,8 +72,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         firsts.append(their / first)
         print(f"{name:58} {their:6.2f} s {own:6.2f} s {ratios[-1]:6.2f} {first:6.2f} s", flush=True)
     if ratios:
-        print(f"\nin the middle of {len(ratios)} files theirs takes {statistics.median(ratios):.2f} times as long as ours,"
-              f" {statistics.median(firsts):.2f} times as ours with compiling")
+        print(
+            f"\nin the middle of {len(ratios)} files theirs takes {statistics.median(ratios):.2f} times as long as ours,"
+            f" {statistics.median(firsts):.2f} times as ours with compiling"
+        )
     return 0
 
 

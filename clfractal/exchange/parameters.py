@@ -131,9 +131,7 @@ class Parameters:
         if name == "mainRot":
             return rotation(self.read("mandelbox_rotation_main"))
         if name in ("rot", "rotinv") and len(indices) == 2:
-            found = rotation(
-                self.read(f"mandelbox_rotation_{('neg', 'pos')[indices[0]]}_{indices[1] + 1}")
-            )
+            found = rotation(self.read(f"mandelbox_rotation_{('neg', 'pos')[indices[0]]}_{indices[1] + 1}"))
             return found if name == "rot" else transposed(found)
         return None
 

@@ -17,6 +17,7 @@ from clfractal.exchange.settings import parse_settings
 from clfractal.scene.load import load_scene
 from tests.exchange.files import program, settings
 from tests.exchange.maps import POINTS, formula_of, mapped
+from tests.variants import one_of
 
 CAMERA = "camera 1.5 -2.4 1.1;\ntarget 0.1 0.2 0.1;\ncamera_top 0.1 0.2 1;\nfov 0.9;"
 TURNED = "fractal_rotation -35 62 110;\nfractal_position 0.2 0.1 0.3;"
@@ -169,3 +170,46 @@ def test_turned_sets_in_both_programs(keys: str, tmp_path: Path) -> None:
     path.write_text(settings(f"{CAMERA}\n{keys}"), encoding="utf-8")
     found = record(path, 48, 100)
     assert causes.verdict(found) == "alike", found
+
+
+NEAR = "camera 3 -6 3;\ntarget 0 0 0;\ncamera_top -0.2 0.4 0.9;"
+FAR = "camera 8 -16 9;\ntarget 0 0 0;\ncamera_top -0.2 0.4 0.9;"
+KALEIDOSCOPE = (
+    "IFS_abs_x true;\nIFS_abs_y true;\nIFS_abs_z true;\nIFS_direction_5 0.71 -0.71 0;\nIFS_enabled_5 true;\n"
+    "IFS_direction_6 0.71 0 -0.71;\nIFS_enabled_6 true;\nIFS_offset 1 1 1;\nIFS_edge 0.5 0.7 0.4;\n"
+    "IFS_rotations_6 20 12 8;\nIFS_rotation 3 12 8;\nIFS_rotation_enabled true;"
+)
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+@pytest.mark.parametrize(
+    ("main", "fractal", "version"),
+    one_of(
+        (f"{NEAR}\nformula_1 10;", KALEIDOSCOPE, "2.20"),
+        (f"{NEAR}\nformula_1 10;", KALEIDOSCOPE.replace("IFS_rotation_enabled true;", ""), "2.06"),
+        (
+            f"{FAR}\nformula_1 8;",
+            "mandelbox_main_rotation_enabled true;\nmandelbox_rotation_main 13 22 -9;\nmandelbox_rotations_enabled true;\n"
+            "mandelbox_rotation_neg_1 13 22 -9;\nmandelbox_rotation_pos_2 3 12 -19;",
+            "2.20",
+        ),
+        (
+            f"{NEAR}\nhybrid_fractal_enable true;\nformula_1 1002;\nformula_2 7;",
+            "transf_rotation 12 20 9;",
+            "2.20",
+        ),
+        (
+            f"{NEAR}\nformula_1 7;\nprimitive_cone_1_enabled true;\nprimitive_cone_1_position 0 -1.5 0.6;\n"
+            "primitive_cone_1_rotation 33 52 -39;",
+            "",
+            "2.20",
+        ),
+    ),
+    ids=["kaleidoscope", "old kaleidoscope", "box", "sponge", "cone"],
+)
+def test_angles_of_formulas_in_both_programs(main: str, fractal: str, version: str, tmp_path: Path) -> None:
+    path = tmp_path / "turned.fract"
+    path.write_text(settings(main, fractal).replace("version 2.20", f"version {version}"), encoding="utf-8")
+    found = record(path, 48, 100)
+    assert causes.verdict(found) == "alike", found
+    assert found["ninth"] < 0.01

@@ -415,7 +415,6 @@ def test_angles_of_matrices() -> None:
         np.testing.assert_allclose(np.array(turned), about[of_ifs], atol=1e-12)
 
 
-
 def test_symbols_are_written_with_as_few_brackets_as_they_need() -> None:
     symbols = Symbols()
     x, y = symbols.name("x"), symbols.name("y")
