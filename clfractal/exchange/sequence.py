@@ -12,6 +12,7 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.counterparts import counterpart
+from clfractal.exchange.ends import BAILOUT, DISCS
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
 from clfractal.exchange.parameters import rotation
@@ -29,8 +30,8 @@ _NEVER = 250
 """`formula_stop_iteration` of a formula that goes on to the end; a file may have more iterations."""
 _TRANSFORMS = 1000
 _SHAPES = range(600, 800)
-_DISCS = (103, 104, 117)
-"""Formulas of the Pseudo Kleinian."""
+_CHOSEN = (2, 20)
+"""The first version whose files choose what a distance is made by."""
 _TUBE = "analyticDE.scale1"
 
 
@@ -303,12 +304,12 @@ def _all_followed(
     four = plan.w != 0
     tube = None
     if _has_discs(plan, slots):
-        found = next(texts[slot.slot].parameters for slot in slots if slot.number in _DISCS).value(_TUBE)
+        found = next(texts[slot.slot].parameters for slot in slots if slot.number in DISCS).value(_TUBE)
         tube = found if isinstance(found, float) else None
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
         following = Following(
-            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, tube
+            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, tube, _bailout(plan)
         )
         try:
             return _followed(plan, slots, texts, order, following), following
@@ -321,11 +322,26 @@ def _all_followed(
             carried = (*carried, *((error.name, "DE") if error.name == "dist" else (error.name,)))
 
 
+def _bailout(plan: Plan) -> float:
+    """Beyond which orbits of the Pseudo Kleinian end."""
+    main = plan.settings.main
+    own = not main.flag("use_default_bailout", True)
+    return max(main.number("bailout", BAILOUT), 1.0) if own else BAILOUT
+
+
 def _has_discs(plan: Plan, slots: Sequence[Slot]) -> bool:
     """Whether distances are those to discs at the end of orbits: all formulas are of that kind, or transforms."""
-    kinds = [slot.number in _DISCS for slot in slots if slot.number < _TRANSFORMS]
+    kinds = [slot.number in DISCS for slot in slots if slot.number < _TRANSFORMS]
     wanted = plan.settings.main.text("delta_DE_function").strip()
-    return bool(kinds) and all(kinds) and wanted in ("", "0", "3", "preferred", "pseudo_kleinian")
+    # (In files of before 2.20 it has no effect.)
+    theirs = (plan.settings.version or _CHOSEN) < _CHOSEN or wanted in (
+        "",
+        "0",
+        "3",
+        "preferred",
+        "pseudo_kleinian",
+    )
+    return bool(kinds) and all(kinds) and theirs
 
 
 def _later(link: dict[str, Any]) -> dict[str, int]:

@@ -9,6 +9,7 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.c_text import Expression, Statement
+from clfractal.exchange.ends import BAILOUT, DISCS, ending
 from clfractal.exchange.installed import Installed
 from clfractal.exchange.parameters import Parameters
 from clfractal.exchange.settings import Section
@@ -84,6 +85,7 @@ class Following:
         carried: the fields that formulas carry, as they depend on z.
         folds: what is done to z before each application.
         tube: radius of the tube about the z axis in which the Pseudo Kleinian's orbits end; None: of other formulas.
+        bailout: beyond which these end.
         shift: how much `n` is above their number of an application; None: applications are formulas of their own.
     """
 
@@ -93,6 +95,7 @@ class Following:
     shift: int | None = None
     folds: Folds = NO_FOLDS
     tube: float | None = None
+    bailout: float = BAILOUT
     symbols: Symbols = field(default_factory=Symbols)
     state: State = field(init=False)
     done: dict[tuple[object, ...], list[Applied]] = field(default_factory=dict)
@@ -137,7 +140,8 @@ class Following:
             except TooLargeError as error:
                 raise FileError(f"has no counterpart: {error}", Where(str(text.file))) from None
             formula = _formula(text, let, maps[:size], adds)
-            self.found[key] = formula | self.carrying(dict(zip(done.carry, maps[size:], strict=True)))
+            formula |= self.carrying(dict(zip(done.carry, maps[size:], strict=True)))
+            self.found[key] = self.ending(formula, text.number in DISCS)
         return self.found[key]
 
     @property
@@ -172,6 +176,12 @@ class Following:
             found["distance"] = f"max({across} - {self.tube:.9g}, {flat})/{carried_name('DE')}"
             found["step_scale"] = _STEP_SCALE
         return found
+
+    def ending(self, formula: dict[str, Any], checks: bool) -> dict[str, Any]:
+        """The formula, whose orbits stop where those of the Pseudo Kleinian do."""
+        if self.tube is None or "dist" in self.carried or formula["add"] == "point":
+            return formula
+        return ending(formula, self.bailout, checks=checks)
 
     def _added(self, z: Sequence[Value], addition: Addition) -> tuple[list[Value], bool]:
         """The map, with what is added but what our language adds by itself; and whether that is the point."""
@@ -210,7 +220,7 @@ class Following:
             "bounds": {"radius": 0.001},
             **(self.carrying({}) or {"derivative": "dr"}),
         }
-        return {"formula": formula, "count": 1, "start": 0, "stop": 1}
+        return {"formula": self.ending(formula, False), "count": 1, "start": 0, "stop": 1}
 
 
 class NeedsFourError(Exception):

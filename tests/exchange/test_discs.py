@@ -38,6 +38,8 @@ def test_distances_to_discs(tmp_path: Path) -> None:
         across = np.hypot(z[0], z[1])
         expected = max(across - 0.5, across * abs(z[2]) / np.linalg.norm(z)) / 4
         assert distance == pytest.approx(expected, rel=1e-6)
-    # Another function for distances than that of discs is none of these.
-    other = import_text(settings("formula_1 104;\nN 2;\ndelta_DE_function 2;"), "x.fract", formulas=folder)
-    assert "distance" not in str(other.scene["formula"])
+    # Another function for distances than that of discs is none of these, but in old files, which do not choose.
+    text = settings("formula_1 104;\nN 2;\ndelta_DE_function 2;")
+    for version, has_discs in (("2.20", False), ("2.19", True)):
+        other = import_text(text.replace("version 2.20", f"version {version}"), "x.fract", formulas=folder)
+        assert ("distance" in str(other.scene["formula"])) == has_discs

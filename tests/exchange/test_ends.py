@@ -1,0 +1,83 @@
+"""Orbits of the Pseudo Kleinian end where they stand still, with what they carry."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from benchmarks.peers import causes, theirs
+from benchmarks.peers.one import record
+from clfractal.exchange.ends import ending
+from clfractal.formulas.catalog import resolve
+from clfractal.formulas.reference import own_distance
+from tests.exchange.files import settings
+
+FOLDED: dict[str, Any] = {
+    "title": "Folds and an inversion",
+    "variables": ["x", "y", "z"],
+    "let": {
+        **{f"f{name}": f"2*clamp({name}, -0.7, 0.7) - {name}" for name in "xyz"},
+        "k": "max(0.5/(fx*fx + fy*fy + fz*fz), 1)",
+    },
+    "map": ["fx*k", "fy*k", "fz*k"],
+    "add": "none",
+    "degree": 1,
+    "bounds": {"radius": 100},
+    "bailout": 1e9,
+    "state": {"grown": {"start": 1, "next": "grown*(k + 0.05)"}},
+    "distance": "sqrt(x*x + y*y)*abs(z)/grown",
+    "distance_bailout": 1e9,
+}
+
+
+def test_what_stands_still_grows_no_more() -> None:
+    points = np.random.default_rng(1).uniform(-6, 6, (400, 3))
+    expected = []
+    for place in points:
+        z, grown = place, 1.0
+        for _ in range(200):
+            folded = 2 * np.clip(z, -0.7, 0.7) - z
+            k = max(0.5 / (folded @ folded), 1.0)
+            before, z = z, folded * k
+            grown *= k + 0.05
+            if (z - before) @ (z - before) < 1e-6 * (z @ z):
+                break
+        expected.append(np.hypot(z[0], z[1]) * abs(z[2]) / grown)
+    chain = resolve({"inline": ending(FOLDED, 100, checks=True)})
+    found = own_distance(chain, points, 200)
+    # (Where orbits are about to end a rounding decides.)
+    near = np.isclose(found, expected, rtol=1e-6)
+    assert near.mean() > 0.99
+    assert not np.isclose(own_distance(resolve({"inline": FOLDED}), points, 200), expected, rtol=0.5).any()
+
+
+def test_what_has_ended_is_left_alone_by_what_does_not_check() -> None:
+    doubles = {
+        **FOLDED,
+        "let": {},
+        "map": ["2*x", "2*y", "2*z"],
+        "state": {"grown": {"start": 1, "next": "2*grown"}},
+    }
+    found = ending(doubles, 100, checks=False)
+    assert found["map"] == ["next_x", "next_y", "next_z"]
+    assert found["let"]["next_x"] == "where(ended > 0, x, 2*x)"
+    assert found["state"]["ended"] == {"start": 0, "next": "ended"}
+    points = np.array([[0.5, 0.2, -0.3]])
+    np.testing.assert_allclose(
+        own_distance(resolve({"inline": found}), points, 5), np.hypot(16, 6.4) * 9.6 / 32
+    )
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+def test_halls_in_both_programs(tmp_path: Path) -> None:
+    path = tmp_path / "halls.fract"
+    path.write_text(
+        settings("formula_1 103;\ncamera 2.66 -4.32 1.41;\ntarget 2.67 -4.28 1.41;\ncamera_top 0 0 1;"),
+        encoding="utf-8",
+    )
+    found = record(path, 48, 100)
+    assert causes.verdict(found) == "alike", found
+    assert found["ninth"] < 0.01
