@@ -9,11 +9,38 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
+from clfractal.exchange.parameters import Parameters
+from clfractal.exchange.translate import carried_name
+
 DISCS = (103, 104, 117)
 """Formulas of the Pseudo Kleinian."""
+PLANES = (122,)
+"""That of Jos Leys's Kleinian groups."""
 BAILOUT = 100.0
 """Of these formulas, where a file gives none of its own."""
 ENDED = "ended"
+
+
+def distance_to_disc(parameters: Parameters) -> str:
+    """Knighty's distance to a disc: within a tube about the z axis, and in the plane z = 0."""
+    across = "sqrt(x*x + y*y)"
+    flat = f"{across}*abs(z)/sqrt(max(x*x + y*y + z*z, 1e-30))"
+    return f"max({across} - {_number(parameters, 'analyticDE.scale1'):.9g}, {flat})/{carried_name('DE')}"
+
+
+def distance_to_planes(parameters: Parameters) -> str:
+    """Jos Leys's distance to two planes across the y axis, or to the lower one."""
+    height = f"y, {_number(parameters, 'transformCommon.foldingValue'):.9g} - y"
+    if not _number(parameters, "transformCommon.spheresEnabled"):
+        height = "y"
+    most, least = (_number(parameters, f"analyticDE.{name}") for name in ("tweak005", "offset1"))
+    return f"min({height}, {most:.9g})/max(abs({carried_name('DE')}), {least:.9g})"
+
+
+def _number(parameters: Parameters, name: str) -> float:
+    found = parameters.value(name)
+    assert isinstance(found, float)
+    return found
 
 
 def ending(formula: Mapping[str, Any], bailout: float, *, checks: bool) -> dict[str, Any]:

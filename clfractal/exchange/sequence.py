@@ -12,7 +12,7 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.counterparts import counterpart
-from clfractal.exchange.ends import BAILOUT, DISCS
+from clfractal.exchange.ends import BAILOUT, DISCS, PLANES, distance_to_disc, distance_to_planes
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
 from clfractal.exchange.parameters import rotation
@@ -32,7 +32,6 @@ _TRANSFORMS = 1000
 _SHAPES = range(600, 800)
 _CHOSEN = (2, 20)
 """The first version whose files choose what a distance is made by."""
-_TUBE = "analyticDE.scale1"
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,7 +98,7 @@ def formula_of(settings: Settings, installed: Installed | None, remarks: list[st
     if not hybrid:
         main.without(main.beginning("formula_weight_"))
     plan = _plan(settings, "_1" if joined else "", installed, remarks)
-    alone = len(slots) == 1 and (installed is None or not _has_discs(plan, slots))
+    alone = len(slots) == 1 and (installed is None or slots[0].number not in DISCS)
     section = _by_library(plan, slots[0]) if alone else None
     if section is None:
         section = _by_texts(plan, slots, main.whole("repeat_from", 1))
@@ -302,14 +301,12 @@ def _all_followed(
     """The formula of each application: of three numbers, if that is enough, and with what has to be carried."""
     first = texts[slots[0].slot].parameters
     four = plan.w != 0
-    tube = None
-    if _has_discs(plan, slots):
-        found = next(texts[slot.slot].parameters for slot in slots if slot.number in DISCS).value(_TUBE)
-        tube = found if isinstance(found, float) else None
+    last = _last(plan, slots, texts)
+    if last is not None:
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
         following = Following(
-            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, tube, _bailout(plan)
+            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, last, _bailout(plan)
         )
         try:
             return _followed(plan, slots, texts, order, following), following
@@ -329,19 +326,24 @@ def _bailout(plan: Plan) -> float:
     return max(main.number("bailout", BAILOUT), 1.0) if own else BAILOUT
 
 
-def _has_discs(plan: Plan, slots: Sequence[Slot]) -> bool:
-    """Whether distances are those to discs at the end of orbits: all formulas are of that kind, or transforms."""
-    kinds = [slot.number in DISCS for slot in slots if slot.number < _TRANSFORMS]
+def _last(plan: Plan, slots: Sequence[Slot], texts: dict[int, Text]) -> str | None:
+    """The distance by the end of orbits, where all formulas are of a kind that has one of its own, or transforms."""
     wanted = plan.settings.main.text("delta_DE_function").strip()
     # (In files of before 2.20 it has no effect.)
-    theirs = (plan.settings.version or _CHOSEN) < _CHOSEN or wanted in (
-        "",
-        "0",
-        "3",
-        "preferred",
-        "pseudo_kleinian",
+    chosen = (plan.settings.version or _CHOSEN) >= _CHOSEN
+    kinds = (
+        (DISCS, ("3", "pseudo_kleinian"), distance_to_disc),
+        (PLANES, ("4", "jos_kleinian"), distance_to_planes),
     )
-    return bool(kinds) and all(kinds) and theirs
+    for kind, names, distance in kinds:
+        own = [slot for slot in slots if slot.number < _TRANSFORMS]
+        if (
+            own
+            and all(slot.number in kind for slot in own)
+            and not (chosen and wanted not in ("", "0", "preferred", *names))
+        ):
+            return distance(texts[own[0].slot].parameters)
+    return None
 
 
 def _later(link: dict[str, Any]) -> dict[str, int]:

@@ -84,7 +84,7 @@ class Following:
         first: the first formula's parameters, which give the scale that an orbit begins with.
         carried: the fields that formulas carry, as they depend on z.
         folds: what is done to z before each application.
-        tube: radius of the tube about the z axis in which the Pseudo Kleinian's orbits end; None: of other formulas.
+        last: the distance by the end of an orbit, of formulas with one of their own (`ends.py`).
         bailout: beyond which these end.
         shift: how much `n` is above their number of an application; None: applications are formulas of their own.
     """
@@ -94,7 +94,7 @@ class Following:
     carried: tuple[str, ...] = ()
     shift: int | None = None
     folds: Folds = NO_FOLDS
-    tube: float | None = None
+    last: str | None = None
     bailout: float = BAILOUT
     symbols: Symbols = field(default_factory=Symbols)
     state: State = field(init=False)
@@ -169,17 +169,14 @@ class Following:
         found: dict[str, Any] = {"state": state}
         if "dist" in self.carried:
             found["distance"] = carried_name("dist")
-        elif self.tube is not None:
-            # Knighty's distance to a disc: within a tube about the z axis, and in the plane z = 0.
-            across = "sqrt(x*x + y*y)"
-            flat = f"{across}*abs(z)/sqrt(max(x*x + y*y + z*z, 1e-30))"
-            found["distance"] = f"max({across} - {self.tube:.9g}, {flat})/{carried_name('DE')}"
+        elif self.last is not None:
+            found["distance"] = self.last
             found["step_scale"] = _STEP_SCALE
         return found
 
     def ending(self, formula: dict[str, Any], checks: bool) -> dict[str, Any]:
         """The formula, whose orbits stop where those of the Pseudo Kleinian do."""
-        if self.tube is None or "dist" in self.carried or formula["add"] == "point":
+        if self.last is None or "dist" in self.carried or formula["add"] == "point":
             return formula
         return ending(formula, self.bailout, checks=checks)
 

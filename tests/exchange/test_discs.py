@@ -1,4 +1,4 @@
-"""Formulas whose orbits end at a disc, as the Pseudo Kleinian's: distances are those to the disc."""
+"""Formulas whose orbits end at a disc, as the Pseudo Kleinian's, or between two planes: distances are those to them."""
 
 from __future__ import annotations
 
@@ -43,3 +43,17 @@ def test_distances_to_discs(tmp_path: Path) -> None:
     for version, has_discs in (("2.20", False), ("2.19", True)):
         other = import_text(text.replace("version 2.20", f"version {version}"), "x.fract", formulas=folder)
         assert ("distance" in str(other.scene["formula"])) == has_discs
+
+
+@pytest.mark.parametrize("spheres", [True, False])
+def test_distances_to_planes(spheres: bool, tmp_path: Path) -> None:
+    text = DISC.replace("\taux->pseudoKleinianDE = fractal->analyticDE.scale1;\n", "")
+    folder = program(tmp_path, jos_kleinian=text)
+    keys = f"transf_folding_value 1.4;\nanalyticDE_tweak_005 0.3;\ntransf_spheres_enabled {str(spheres).lower()};"
+    found = import_text(settings("formula_1 122;\nN 2;", keys), "x.fract", formulas=folder)
+    points = np.array([[0.2, 0.3, 0.4], [0.75, 0.04, 0.05]])
+    measured = own_distance(resolve(found.scene["formula"]), points, 2)
+    for point, distance in zip(points, measured, strict=True):
+        height = 4 * point[1]
+        expected = min(height, 1.4 - height, 0.3) / 4 if spheres else min(height, 0.3) / 4
+        assert distance == pytest.approx(expected, rel=1e-6)
