@@ -37,6 +37,14 @@ def distance_to_planes(parameters: Parameters) -> str:
     return f"min({height}, {most:.9g})/max(abs({carried_name('DE')}), {least:.9g})"
 
 
+def distance_to_middle(size: int, *, powers: bool) -> str:
+    """By how long z is, and how fast that grew, wherever the orbit ends: of powers by the logarithm."""
+    square = " + ".join(f"{name}*{name}" for name in "xyzw"[:size])
+    length = f"sqrt({square})"
+    grown = f"max(abs({carried_name('DE')}), 1e-30)"
+    return f"0.25*{length}*log(max({square}, 1))/{grown}" if powers else f"{length}/{grown}"
+
+
 def _number(parameters: Parameters, name: str) -> float:
     found = parameters.value(name)
     assert isinstance(found, float)

@@ -164,6 +164,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
         scene["materials"] = materials
     if is_mirrored(settings):
         mirror(scene)
+    _hollow_out(scene, settings, installed)
     _leave_out_lamps(scene, remarks)
     coloring = coloring_of(settings, remarks)
     if coloring is not None:
@@ -192,6 +193,24 @@ def _without_unused(main: Section) -> None:
         main.without(
             key for key in main.beginning("mat") if key[3:4] in "23456789" and key[4:5] in "_0123456789"
         )
+
+
+_SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")
+"""Keys with which what does not escape is a solid."""
+
+
+def _hollow_out(scene: dict[str, Any], settings: Settings, installed: Installed | None) -> None:
+    """Where the eye is among what does not escape, theirs take surfaces to be where their distances end."""
+    section = scene["formula"]
+    solid = any(settings.main.flag(key, False) for key in _SOLID)
+    if solid or "inline" not in section or "distance" in str(section):
+        return
+    if not are_inside(section, [scene["camera"]["position"]])[0]:
+        return
+    members = [each["inline"] for each in section["inline"].get("chain", [section])]
+    settings.origins.clear()
+    powers = any(each["degree"] >= 2 for each in members)
+    scene["formula"] = formula_of(settings, installed, [], hollow=powers)
 
 
 def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:

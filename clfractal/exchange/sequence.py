@@ -12,7 +12,14 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.counterparts import counterpart
-from clfractal.exchange.ends import BAILOUT, DISCS, PLANES, distance_to_disc, distance_to_planes
+from clfractal.exchange.ends import (
+    BAILOUT,
+    DISCS,
+    PLANES,
+    distance_to_disc,
+    distance_to_middle,
+    distance_to_planes,
+)
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
 from clfractal.exchange.parameters import rotation
@@ -61,6 +68,7 @@ class Plan:
     folds: Folds
     installed: Installed | None
     remarks: list[str]
+    hollow: bool | None = None
 
     def addition(self, slot: Slot) -> Addition:
         """What is added after a formula."""
@@ -72,11 +80,14 @@ class Plan:
         return Addition(constant=self.julia, swapped=swapped)
 
 
-def formula_of(settings: Settings, installed: Installed | None, remarks: list[str]) -> dict[str, Any]:
+def formula_of(
+    settings: Settings, installed: Installed | None, remarks: list[str], *, hollow: bool | None = None
+) -> dict[str, Any]:
     """The section `formula` of a scene.
 
     Args:
         installed: where texts of formulas are read; None: there are none.
+        hollow: what does not escape is no solid: distances are those of the last application, of powers (True) or not.
 
     Raises:
         FileError: a formula has no counterpart, at its line; or a value is none of its kind.
@@ -97,8 +108,8 @@ def formula_of(settings: Settings, installed: Installed | None, remarks: list[st
         main.without(main.beginning("formula_scale_"))
     if not hybrid:
         main.without(main.beginning("formula_weight_"))
-    plan = _plan(settings, "_1" if joined else "", installed, remarks)
-    alone = len(slots) == 1 and (installed is None or slots[0].number not in DISCS)
+    plan = _plan(settings, "_1" if joined else "", installed, remarks, hollow)
+    alone = len(slots) == 1 and hollow is None and (installed is None or slots[0].number not in DISCS)
     section = _by_library(plan, slots[0]) if alone else None
     if section is None:
         section = _by_texts(plan, slots, main.whole("repeat_from", 1))
@@ -150,7 +161,13 @@ def joined_of(settings: Settings, installed: Installed | None, remarks: list[str
 _JOINS = {0: "intersection", 1: "union", 2: "cut"}
 
 
-def _plan(settings: Settings, suffix: str, installed: Installed | None, remarks: list[str]) -> Plan:
+def _plan(
+    settings: Settings,
+    suffix: str,
+    installed: Installed | None,
+    remarks: list[str],
+    hollow: bool | None = None,
+) -> Plan:
     """What holds for all formulas, or with a suffix for one of them."""
     main = settings.main
     factors = main.vector(f"fractal_constant_factor{suffix}", (1, 1, 1))
@@ -170,6 +187,7 @@ def _plan(settings: Settings, suffix: str, installed: Installed | None, remarks:
         _folds(main),
         installed,
         remarks,
+        hollow,
     )
 
 
@@ -302,11 +320,14 @@ def _all_followed(
     first = texts[slots[0].slot].parameters
     four = plan.w != 0
     last = _last(plan, slots, texts)
-    if last is not None:
+    bailout = None if last is None else _bailout(plan)
+    if last is not None or plan.hollow is not None:
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
+        if plan.hollow is not None:
+            last = distance_to_middle(4 if four else 3, powers=plan.hollow)
         following = Following(
-            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, last, _bailout(plan)
+            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, last, bailout
         )
         try:
             return _followed(plan, slots, texts, order, following), following
@@ -328,6 +349,8 @@ def _bailout(plan: Plan) -> float:
 
 def _last(plan: Plan, slots: Sequence[Slot], texts: dict[int, Text]) -> str | None:
     """The distance by the end of orbits, where all formulas are of a kind that has one of its own, or transforms."""
+    if plan.hollow is not None:
+        return None
     wanted = plan.settings.main.text("delta_DE_function").strip()
     # (In files of before 2.20 it has no effect.)
     chosen = (plan.settings.version or _CHOSEN) >= _CHOSEN

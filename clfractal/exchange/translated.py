@@ -9,7 +9,7 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.c_text import Expression, Statement
-from clfractal.exchange.ends import BAILOUT, DISCS, ending
+from clfractal.exchange.ends import DISCS, ending
 from clfractal.exchange.installed import Installed
 from clfractal.exchange.parameters import Parameters
 from clfractal.exchange.settings import Section
@@ -85,7 +85,7 @@ class Following:
         carried: the fields that formulas carry, as they depend on z.
         folds: what is done to z before each application.
         last: the distance by the end of an orbit, of formulas with one of their own (`ends.py`).
-        bailout: beyond which these end.
+        bailout: beyond which orbits end that may also stand still; None: they go on.
         shift: how much `n` is above their number of an application; None: applications are formulas of their own.
     """
 
@@ -95,7 +95,7 @@ class Following:
     shift: int | None = None
     folds: Folds = NO_FOLDS
     last: str | None = None
-    bailout: float = BAILOUT
+    bailout: float | None = None
     symbols: Symbols = field(default_factory=Symbols)
     state: State = field(init=False)
     done: dict[tuple[object, ...], list[Applied]] = field(default_factory=dict)
@@ -176,7 +176,7 @@ class Following:
 
     def ending(self, formula: dict[str, Any], checks: bool) -> dict[str, Any]:
         """The formula, whose orbits stop where those of the Pseudo Kleinian do."""
-        if self.last is None or "dist" in self.carried or formula["add"] == "point":
+        if self.bailout is None or "dist" in self.carried or formula["add"] == "point":
             return formula
         return ending(formula, self.bailout, checks=checks)
 

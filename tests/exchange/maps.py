@@ -27,7 +27,8 @@ def mapped(formula: dict[str, Any], state: Doubles, point: Doubles) -> Doubles:
 
 def formula_of(folder: Path, fractal: str = "", main: str = "") -> dict[str, Any]:
     """The scene's formula of a file whose first formula is the text `mandelbulb` of a folder."""
-    text = settings(f"N 9;\nalpha_enabled 1;\n{main}", fractal)
+    # (What does not escape is a solid, even where the eye is.)
+    text = settings(f"N 9;\nalpha_enabled 1;\n{main}\niteration_threshold_mode true;", fractal)
     section = import_text(text, "x.fract", formulas=folder).scene["formula"]
     assert isinstance(section, dict)
     return section

@@ -39,7 +39,7 @@ def test_distances_to_discs(tmp_path: Path) -> None:
         expected = max(across - 0.5, across * abs(z[2]) / np.linalg.norm(z)) / 4
         assert distance == pytest.approx(expected, rel=1e-6)
     # Another function for distances than that of discs is none of these, but in old files, which do not choose.
-    text = settings("formula_1 104;\nN 2;\ndelta_DE_function 2;")
+    text = settings("formula_1 104;\nN 2;\ndelta_DE_function 2;\niteration_threshold_mode true;")
     for version, has_discs in (("2.20", False), ("2.19", True)):
         other = import_text(text.replace("version 2.20", f"version {version}"), "x.fract", formulas=folder)
         assert ("distance" in str(other.scene["formula"])) == has_discs
@@ -57,3 +57,30 @@ def test_distances_to_planes(spheres: bool, tmp_path: Path) -> None:
         height = 4 * point[1]
         expected = min(height, 1.4 - height, 0.3) / 4 if spheres else min(height, 0.3) / 4
         assert distance == pytest.approx(expected, rel=1e-6)
+
+
+def test_an_eye_among_what_does_not_escape(tmp_path: Path) -> None:
+    """Three applications are too few for anything to escape: distances are how long z is by how fast it grew."""
+    text = """REAL4 OwnSlowIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	z = fabs(z) * 1.1f - (REAL4){1.0f, 0.0f, 0.0f, 0.0f};
+	aux->DE = aux->DE * 1.1f;
+	return z;
+}
+"""
+    folder = program(tmp_path, menger_mod1=text)
+    keys = "formula_1 61;\nN 3;\ncamera 0.3 0.2 0.1;\ntarget 1 1 1;"
+    found = import_text(settings(keys), "x.fract", formulas=folder)
+    points = np.array([[0.2, 0.3, 0.4], [0.75, 0.0, 0.05]])
+    measured = own_distance(resolve(found.scene["formula"]), points, 3)
+    for point, distance in zip(points, measured, strict=True):
+        z = point
+        for _ in range(3):
+            z = 1.1 * np.abs(z) - [1, 0, 0]
+        assert distance == pytest.approx(np.linalg.norm(z) / 1.1**3, rel=1e-6)
+    assert len(found.origins) == 1
+    # From where it escapes the set is a solid as ever.
+    far = import_text(
+        settings(keys.replace("N 3", "N 90").replace("0.3 0.2", "9 9")), "x.fract", formulas=folder
+    )
+    assert "distance" not in str(far.scene["formula"])
