@@ -125,6 +125,8 @@ def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seco
     asked |= {"optional_image_channels_enabled": 1, "zbuffer_enabled": 1, "zbuffer_quality": 1}
     asked |= {"world_enabled": 1, "world_quality": 1}
     asked["detail_level"] = FINER * main.number("detail_level", 1.0)
+    if main.flag("constant_DE_threshold", False):  # which does not follow the level
+        asked["DE_thresh"] = main.number("DE_thresh", 0.01) / 20
     asked |= {f"mat{number}_transparency_of_surface": 0 for number in range(1, 10)}
     with tempfile.TemporaryDirectory(prefix="peers-") as folder:
         output = Path(folder, "picture.png")
