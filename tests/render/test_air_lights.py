@@ -73,7 +73,7 @@ def test_many_lamps(device: Device, fog: dict[str, Any]) -> None:
             for number, place in enumerate(places)
         )
     )
-    agree(scene, device, shines, noise=0.2)  # (each sample asks one of them)
+    agree(scene, device, shines)
 
 
 @pytest.mark.parametrize("mode", [{"mode": "path", "bounces": 0}, {"mode": "direct"}], ids=["path", "direct"])
