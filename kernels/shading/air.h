@@ -65,7 +65,7 @@ INLINE air_about air_about_place(const air_way *way, vec place, real radius, mat
     a.first = real_atan2(-a.nearest, a.beside);
     a.last = real_atan2(end - a.nearest, a.beside);
     a.near = scattered_at(way, clamp(a.nearest, R(0.0), end), m) * (a.last - a.first) / a.beside;
-    a.by_depth = way->all / (vec_dot(apart, apart) + way->middle * way->middle);
+    a.by_depth = way->all / fmax(vec_dot(apart, apart), least_beside * least_beside);
     return a;
 }
 
