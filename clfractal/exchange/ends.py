@@ -1,7 +1,7 @@
-"""Orbits of the Pseudo Kleinian that stand still: theirs end there, with what they carry.
+"""How orbits of theirs end: distances that follow from the last place, and orbits that stand still before.
 
-Theirs apply no more formulas once z has moved by less than a tenth over the bailout, as a part of its length, or is
-beyond the bailout. Ours go on to the last application, and a number tells that an orbit has ended.
+Theirs apply no more formulas of the Pseudo Kleinian once z has moved by less than a tenth over the bailout, as a part of
+its length, or is beyond the bailout. Ours go on to the last application, and a number tells that an orbit has ended.
 """
 
 from __future__ import annotations

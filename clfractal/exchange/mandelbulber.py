@@ -202,15 +202,16 @@ _SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")
 def _hollow_out(scene: dict[str, Any], settings: Settings, installed: Installed | None) -> None:
     """Where the eye is among what does not escape, theirs take surfaces to be where their distances end."""
     section = scene["formula"]
-    solid = any(settings.main.flag(key, False) for key in _SOLID)
-    if solid or "inline" not in section or "distance" in str(section):
-        return
-    if not are_inside(section, [scene["camera"]["position"]])[0]:
+    if "inline" not in section or any(settings.main.flag(key, False) for key in _SOLID):
         return
     members = [each["inline"] for each in section["inline"].get("chain", [section])]
-    settings.origins.clear()
+    known = any("distance" in each for each in members)
+    if known or not are_inside(section, [scene["camera"]["position"]])[0]:
+        return
     powers = any(each["degree"] >= 2 for each in members)
     scene["formula"] = formula_of(settings, installed, [], hollow=powers)
+    # (Texts that were read again are told once.)
+    settings.origins[:] = dict.fromkeys(settings.origins)
 
 
 def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:

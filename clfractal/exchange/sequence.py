@@ -320,7 +320,8 @@ def _all_followed(
     first = texts[slots[0].slot].parameters
     four = plan.w != 0
     last = _last(plan, slots, texts)
-    bailout = None if last is None else _bailout(plan)
+    stands_still = last is not None and any(slot.number in DISCS for slot in slots)
+    bailout = _bailout(plan) if stands_still else None
     if last is not None or plan.hollow is not None:
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
     while True:
@@ -358,13 +359,10 @@ def _last(plan: Plan, slots: Sequence[Slot], texts: dict[int, Text]) -> str | No
         (DISCS, ("3", "pseudo_kleinian"), distance_to_disc),
         (PLANES, ("4", "jos_kleinian"), distance_to_planes),
     )
+    own = [slot for slot in slots if slot.number < _TRANSFORMS]
     for kind, names, distance in kinds:
-        own = [slot for slot in slots if slot.number < _TRANSFORMS]
-        if (
-            own
-            and all(slot.number in kind for slot in own)
-            and not (chosen and wanted not in ("", "0", "preferred", *names))
-        ):
+        fits = not chosen or wanted in ("", "0", "preferred", *names)
+        if own and fits and all(slot.number in kind for slot in own):
             return distance(texts[own[0].slot].parameters)
     return None
 

@@ -142,9 +142,11 @@ def test_no_light_is_lost_or_counted_twice(case: str, monkeypatch: pytest.Monkey
     shape, lamp = CASES[case]
     view: dict[str, Any] = {"eye": [0, -1.5, 0.2], "target": [-0.15, -0.1, -0.8]}
     scene = under(SHAPES[shape], [{"type": "sphere", "radius": 0.5, "intensity": 8, **lamp}], 16, **view)
-    own, chance = assert_as_by_chance(scene, 48, monkeypatch)
-    # At equal samples. (Few beginnings find some chains of the cone, and these are made up for by bright dots.)
-    assert own / 4 < chance or case == "cone"
+    # (Few beginnings find some chains of the cone, which are made up for by bright dots in a few pixels.)
+    over_pixels = np.median if case == "cone" else np.mean
+    own, chance = assert_as_by_chance(scene, 48, monkeypatch, over_pixels=over_pixels)
+    # At equal samples.
+    assert own / 4 < chance
 
 
 @pytest.mark.light
