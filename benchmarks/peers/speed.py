@@ -4,7 +4,7 @@
 
 Both write a PNG of the whole picture, with the file's own lights and shadows. What ours does not take over is switched off
 in theirs (`NOT_OURS`). How fine its surface is stays as the file says; ours is found to a part of a pixel. The first
-picture of ours compiles the formula's program, and is told apart; then each makes one in turn, of which the middle time counts.
+picture of ours compiles the formula's program, and is told apart; then each makes one in turn, whose middle time counts.
 """
 
 from __future__ import annotations
