@@ -61,6 +61,10 @@ class TheirsError(Exception):
     """It made no picture; the message says why, in one line."""
 
 
+class TooLongError(TheirsError):
+    """It was stopped after the time given."""
+
+
 @dataclass(frozen=True, slots=True)
 class Depths:
     """Their picture's depths.
@@ -90,7 +94,8 @@ def picture(
     """Renders a settings file to PNG files: `output`, and beside it what else the overrides ask for.
 
     Raises:
-        TheirsError: it made none, or took too long.
+        TooLongError: it took too long.
+        TheirsError: it made none.
     """
     with tempfile.TemporaryDirectory(prefix="mandelbulber-") as home:
         command: list[str | Path] = [PROGRAM, "-n", "-C", "-r", f"{size[0]}x{size[1]}", "-f", "png"]
@@ -107,7 +112,7 @@ def picture(
                 check=False,
             )
         except subprocess.TimeoutExpired:
-            raise TheirsError(f"theirs took more than {seconds:g} s") from None
+            raise TooLongError(f"theirs took more than {seconds:g} s") from None
     if not output.is_file():
         raise TheirsError("theirs wrote no picture")
 

@@ -55,7 +55,11 @@ typedef struct {
     real near, by_depth;
 } air_about;
 
-INLINE air_about air_about_place(const air_way *way, vec place, real radius, material_record m) {
+// (What stands at the middle itself is no nearer to most of the fog than `core`, a square: a third of the way to there. Within what is
+// larger, light comes from all around: fog by depth scatters most, and the core is 0.)
+INLINE real air_core(const air_way *way) { return R(0.1) * way->middle * way->middle; }
+
+INLINE air_about air_about_place(const air_way *way, vec place, real radius, real core, material_record m) {
     air_about a;
     const real least_beside = fmax(radius, R(1e-6)), end = fmin(way->far, R(1e30));
     const vec toward = vec_sub(place, way->r.origin);
@@ -65,7 +69,7 @@ INLINE air_about air_about_place(const air_way *way, vec place, real radius, mat
     a.first = real_atan2(-a.nearest, a.beside);
     a.last = real_atan2(end - a.nearest, a.beside);
     a.near = scattered_at(way, clamp(a.nearest, R(0.0), end), m) * (a.last - a.first) / a.beside;
-    a.by_depth = way->all / fmax(vec_dot(apart, apart), least_beside * least_beside);
+    a.by_depth = way->all / (vec_dot(apart, apart) + core + least_beside * least_beside);
     return a;
 }
 
@@ -101,7 +105,7 @@ INLINE scattering scattered_of(const air_way *way, light_record light, real u, r
     if (!light->seen && !light->inverse_square) {
         found.t = place_by_depth(way, u, w.material);
     } else {
-        const air_about about = air_about_place(way, vec_splat(light->vector), R(0.0), w.material);
+        const air_about about = air_about_place(way, vec_splat(light->vector), R(0.0), air_core(way), w.material);
         found.t = place_about(way, &about, u, w.material, &weight);
     }
     const vec point = vec_along(way->r.origin, found.t, way->r.direction);

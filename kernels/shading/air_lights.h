@@ -27,7 +27,7 @@ CALLED air_light sun_in_air(const air_way *way, real u, real v, real other, worl
 
 // About what a light brings that stands at a place, is so bright from a distance of 1, and fills a ball.
 INLINE real air_weight(const air_way *way, vec place, real radius, real power, material_record m) {
-    const air_about a = air_about_place(way, place, radius, m);
+    const air_about a = air_about_place(way, place, radius, air_core(way), m);
     return power * (a.near + a.by_depth);
 }
 
@@ -88,12 +88,18 @@ INLINE real lamps_in_air(const air_way *way, __global const float *tree, int nod
 // Whether a thing has no end: it shines alike into the air near by and far away.
 #define IS_ENDLESS(o) ((o)->kind == SHAPE_PLANE)
 
+// The square of the radius of a ball around it.
+INLINE real emitter_square(object_record o) {
+    const scalar x = o->sides[0], y = o->sides[1], z = o->sides[2];
+    return (real)(x * x + y * y + z * z);
+}
+
 // (A ball of the same area as an object's three sides has about its strength from afar.)
 INLINE real emitter_in_air(const air_way *way, object_record o, world w) {
     if (IS_ENDLESS(o)) return (real)(LIGHT_PI * o->luminance) * way->all;
     const scalar x = o->sides[0], y = o->sides[1], z = o->sides[2];
-    const scalar radius = sqrt(x * x + y * y + z * z);
-    return air_weight(way, vec_splat(o->middle), (real)(radius), (real)(o->luminance * (x * y + y * z + z * x)), w.material);
+    const real radius = sqrt(emitter_square(o));
+    return air_weight(way, vec_splat(o->middle), radius, (real)(o->luminance * (x * y + y * z + z * x)), w.material);
 }
 
 // One of the tree's lamps: lanes that have chosen the same one ask it together.
@@ -136,7 +142,8 @@ CALLED void air_of_emitter(air_light *found, const air_way *way, real place, mas
                            real other, int seeks, world w) {
     real weight = way->all, t = place_by_depth(way, u, w.material);
     if (!IS_ENDLESS(o)) {
-        const air_about about = air_about_place(way, vec_splat(o->middle), R(0.0), w.material);
+        const real core = fmax(air_core(way) - emitter_square(o), R(0.0));
+        const air_about about = air_about_place(way, vec_splat(o->middle), R(0.0), core, w.material);
         t = place_about(way, &about, u, w.material, &weight);
     }
     const vec point = vec_along(way->r.origin, t, way->r.direction);
@@ -173,7 +180,7 @@ CALLED void air_of_emitters(air_light *found, const air_way *way, real place, ma
 CALLED void air_of_balls(air_light *found, const air_way *way, real place, mask here, real probability, real u, real v, real other, world w) {
     real share, weight;
     const set_ball ball = set_ball_of(air_descent(way, &place, here, w.tables + w.settings->ball_tree, w.material, &share), w);
-    const air_about about = air_about_place(way, ball.center, R(0.0), w.material);
+    const air_about about = air_about_place(way, ball.center, R(0.0), air_core(way), w.material);
     const real t = place_about(way, &about, u, w.material, &weight);
     const vec point = vec_along(way->r.origin, t, way->r.direction);
     light_ray one = {ball.center, R(0.0), ball.light, R(1.0)};

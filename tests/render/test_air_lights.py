@@ -60,7 +60,7 @@ def test_many_lamps(device: Device, fog: dict[str, Any]) -> None:
         }
         for number, place in enumerate(places)
     ]
-    scene = foggy(fog, lights=lights, renderer={"samples": 512})
+    scene = foggy(fog, lights=lights, renderer={"samples": 1024})
     small = 1e-3
     shines = both(
         *(

@@ -140,6 +140,29 @@ def test_noise_fades(device: Device) -> None:
     assert np.abs(more - most).mean() < 0.4 * np.abs(few - most).mean()
 
 
+def test_a_lamp_where_half_of_the_light_is_scattered_has_no_noise_of_its_own(device: Device) -> None:
+    """Not more of it than one that is nearer to the eye, whose fog is chosen by the angle at the lamp too."""
+    origin, way, _ = rays(scene_with({"direction": [1, 0, 0]}, 1, density=0.2))
+    corner = np.broadcast_to(origin, way.shape)[4, 4], way[4, 4]
+
+    def noise(distance: float) -> float:
+        place = (corner[0] + distance * corner[1]).tolist()
+        light = {"type": "point", "position": place, "falloff": "inverse_square", "shadow": False}
+        scene = scene_with(light, 16, density=0.2)
+        seeds = [scene.surface.model_copy(update={"seed": seed}) for seed in range(6)]
+        seen = np.array(
+            [shoot(scene.model_copy(update={"renderer": each}), device)["R"][:10, :10] for each in seeds],
+            float,
+        )
+        # (Around it; the nearest pixels' own width matters more.)
+        around = np.ones((10, 10), bool)
+        around[3:6, 3:6] = False
+        return float((seen.std(axis=0, ddof=1) / seen.mean(axis=0))[around].mean())
+
+    half = math.log(2) / 0.2
+    assert noise(half) < 2.5 * noise(0.7 * half)
+
+
 def test_a_soft_light_has_soft_shafts(device: Device) -> None:
     """Scattered alike to all sides, its size does not change how bright fog without shadows is."""
     light = {"direction": [-1, 1, -1], "shadow": False}
