@@ -218,12 +218,12 @@ class _Reader:
             ):
                 raise self.refuse(node, "an array of this size")
             size, kind = int(kind.dim.value), kind.type
-        if isinstance(kind, self.c.PtrDecl) and self.type_of(kind.type) in SIZES and node.init is not None:
-            return Statement("declare", node.name, (self.expression(node.init),), (), line, POINTER)
+        values = () if node.init is None else (self.expression(node.init),)
+        if isinstance(kind, self.c.PtrDecl) and self.type_of(kind.type) in SIZES:
+            return Statement("declare", node.name, values, (), line, POINTER)
         name = self.type_of(kind)
         if name != MATRIX and name not in SIZES and not name.startswith("enum"):
             raise self.refuse(node, f"type {name}")
-        values = () if node.init is None else (self.expression(node.init),)
         return Statement(
             "declare", node.name, values, (), line, "int" if name.startswith("enum") else name, size
         )

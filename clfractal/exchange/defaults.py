@@ -29,6 +29,7 @@ KEYS: Mapping[str, str] = {
     "aSurf3Folds.orderOf3Folds2": "aSurf3Folds_order_of_folds_2",
     "aSurf3Folds.orderOf3Folds3": "aSurf3Folds_order_of_folds_3",
     "foldingIntPow.foldFactor": "boxfold_bulbpow2_folding_factor",
+    "genFoldBox.type": "mandelbox_generalized_fold_type",
     "mandelbox.foldingSphericalFixed": "mandelbox_folding_fixed_radius",
     "mandelbox.foldingSphericalMin": "mandelbox_folding_min_radius",
     "transformCommon.additionConstant000": "transf_addition_constant",

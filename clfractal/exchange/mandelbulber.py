@@ -12,7 +12,7 @@ from clfractal.exchange.colors import coloring_of
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
 from clfractal.exchange.measure import are_inside
-from clfractal.exchange.placing import mirror, place_around, placing_of
+from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around, placing_of
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
 from clfractal.exchange.solids import solids_of
@@ -148,11 +148,11 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     scene["formula"] = formula_of(settings, installed, remarks)
     scene |= view_of(settings, remarks)
     scene |= look_of(settings, scene["camera"], look, remarks)
-    solids, materials = solids_of(settings.main, remarks)
     joined = joined_of(settings, installed, remarks)
-    # What joins all before it is cut to the limits in the end.
+    solids, materials = solids_of(settings.main, len(joined), remarks)
+    # Solids come after the formulas, which may cut each other; what joins all before it is cut to the limits in the end.
     limits = scene.pop("objects", {})
-    objects = {**solids, **joined, **limits}
+    objects = {**joined, **solids, **limits}
     if objects:
         scene["objects"] = objects
     placing = placing_of(settings)
@@ -202,7 +202,7 @@ _SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")
 def _hollow_out(scene: dict[str, Any], settings: Settings, installed: Installed | None) -> None:
     """Where the eye is among what does not escape, theirs take surfaces to be where their distances end."""
     section = scene["formula"]
-    if "inline" not in section or any(settings.main.flag(key, False) for key in _SOLID):
+    if section == "none" or "inline" not in section or any(settings.main.flag(key, False) for key in _SOLID):
         return
     members = [each["inline"] for each in section["inline"].get("chain", [section])]
     known = any("distance" in each for each in members)
@@ -219,8 +219,14 @@ def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:
     lamps = [light for light in scene["lights"] if light.get("type") == "point"]
     if not lamps:
         return
-    held = are_inside(scene["formula"], [lamp["position"] for lamp in lamps])
-    balls = [each for each in scene.get("objects", {}).values() if each["type"] == "sphere"]
+    held = _held(scene, [lamp["position"] for lamp in lamps])
+    eye = scene["camera"]["position"]
+    balls = [
+        each
+        for each in scene.get("objects", {}).values()
+        # A ball around the eye is a room.
+        if each["type"] == "sphere" and math.dist(eye, each["position"]) > each["radius"]
+    ]
     for lamp, inside in zip(lamps, held, strict=True):
         place = lamp["position"]
         if inside or any(math.dist(place, ball["position"]) <= ball["radius"] for ball in balls):
@@ -228,6 +234,20 @@ def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:
             remarks.append(
                 f"a lamp at {', '.join(f'{each:g}' for each in place)} is within a solid; left out"
             )
+
+
+def _held(scene: dict[str, Any], places: list[list[float]]) -> list[bool]:
+    """Which places are within the formula, or one that stands beside it."""
+    found = [False] * len(places) if scene["formula"] == "none" else are_inside(scene["formula"], places)
+    for each in scene.get("objects", {}).values():
+        if each["type"] != "formula" or each.get("join", "union") != "union":
+            continue
+        turn = matrix_of(each.get("rotation", (0, 0, 0)))
+        placing, scale = Placing(turn, each["position"]), each.get("scale", 1.0)
+        own = [[part / scale for part in placing.place(place)] for place in places]
+        more = are_inside(each["formula"], own)
+        found = [a or b for a, b in zip(found, more, strict=True)]
+    return found
 
 
 def _left(settings: Settings) -> list[str]:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from clfractal.exchange.settings import Settings
-
 DIRECTIONS = 400
 NEAREST, FARTHEST, STEP = 0.05, 120.0, 1.12
 LOOKED_AT = 12
@@ -16,8 +14,15 @@ LEAST = 2.1
 """Of sets of powers: the needles of the Mandelbrot set are thin, and reach -2."""
 
 
-def measured(links: Sequence[dict[str, Any]], iterations: int, settings: Settings) -> dict[str, Any]:
-    """The section `formula` of a scene, of members with `formula`, `count`, `start` and `stop`."""
+def measured(
+    links: Sequence[dict[str, Any]], iterations: int, reach: float, repeats: Sequence[float]
+) -> dict[str, Any]:
+    """The section `formula` of a scene, of members with `formula`, `count`, `start` and `stop`.
+
+    Args:
+        reach: how far from the origin anything is seen, scene units.
+        repeats: after which lengths along each axis space is there once more; 0: it is not.
+    """
     import numpy as np
 
     generator = np.random.default_rng(1)
@@ -34,17 +39,13 @@ def measured(links: Sequence[dict[str, Any]], iterations: int, settings: Setting
             done[id(link["formula"])] = {**link["formula"], "degree": _degree(link["formula"], directions)}
     members = [{**link, "formula": done[id(link["formula"])]} for link in links]
     shapes = any("distance" in formula for formula in done.values())
-    radius = FARTHEST if shapes else _radius(members, directions, min(iterations, LOOKED_AT))
+    radius = FARTHEST if shapes else _radius(members, directions, min(iterations, LOOKED_AT), repeats)
     if any(formula["degree"] >= 2 for formula in done.values()):
         radius = max(radius, LEAST)
-    main = settings.main
-    # Nothing is seen farther out than they look.
-    seen = float(np.linalg.norm(main.vector("camera", (3, -6, 2)))) + max(
-        main.number("view_distance_max", 50.0), 0.1
-    )
-    radius = float(f"{min(radius, max(seen, 0.1), 1e6):.4g}")
+    farthest = max(reach, 0.1)
     # Shapes are there whatever becomes of z.
-    bailout = 1e9 if shapes else float(f"{max(4.0, 3 * radius):.4g}")
+    bailout = 1e9 if shapes else float(f"{max(4.0, 3 * min(radius, farthest)):.4g}")
+    radius = float(f"{min(FARTHEST if any(repeats) else radius, farthest, 1e6):.4g}")
     shared = {"bounds": {"center": [0, 0, 0], "radius": radius}, "bailout": bailout}
     for formula in done.values():
         formula |= {"bounds": {"radius": radius}, "bailout": bailout}
@@ -101,8 +102,10 @@ def _degree(formula: dict[str, Any], directions: Any) -> float:
     return min(max(near, 1.0), 64.0)
 
 
-def _radius(members: Sequence[dict[str, Any]], directions: Any, applications: int) -> float:
-    """The radius of a ball around the origin that has all places which are still near after some applications."""
+def _radius(
+    members: Sequence[dict[str, Any]], directions: Any, applications: int, repeats: Sequence[float]
+) -> float:
+    """The radius of a ball around the origin with all places of the middle cell that are near after some applications."""
     import numpy as np
 
     from clfractal.formulas.catalog import resolve
@@ -115,6 +118,8 @@ def _radius(members: Sequence[dict[str, Any]], directions: Any, applications: in
     points = (radii[:, None, None] * directions[None, :70]).reshape(-1, 3)
     with np.errstate(all="ignore"):
         _, inside = escape(chain, points, min(max(applications, last + 2), 40))
+    halves = np.array([length / 2 if length > 0 else np.inf for length in repeats])
+    inside &= np.all(abs(points) <= halves, axis=1)
     kept = inside.reshape(count, -1).any(axis=1)
     if not kept.any():
         return 4.0

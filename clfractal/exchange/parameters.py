@@ -8,11 +8,12 @@ from functools import cache
 
 from clfractal.errors import FileError
 from clfractal.exchange.defaults import GROUPS, KEYS, OTHERS, default_of, folded
+from clfractal.exchange.polyhedra import faces
 from clfractal.exchange.settings import Section
 
 Vector = tuple[float, ...]
 Matrix = tuple[Vector, Vector, Vector]
-Found = float | Vector | Matrix
+Found = float | Vector | Matrix | tuple[Vector, ...]
 
 IGNORED = ("mandelbox.color",)
 """What chooses colours alone."""
@@ -48,6 +49,8 @@ class Parameters:
             found = self._of_ifs(name, indices)
         elif group == "mandelbox":
             found = self._of_box(name, indices)
+        elif group == "genFoldBox":
+            found = self._of_fold(name)
         else:
             found = self._derived(path)
         if found is not None:
@@ -78,7 +81,11 @@ class Parameters:
         word = word.removeprefix("combo_")
         if word.startswith("type") and word[4:].isdecimal() and len(word) < 8:
             return float(int(word[4:]) - 1)
-        names = {name: number for name, number in self.choices.items() if name.endswith(f"_{word}")}
+        names = {
+            name: number
+            for name, number in self.choices.items()
+            if name.endswith(f"_{word}") or folded(name.rpartition("_")[2]) == folded(word)
+        }
         found = set(names.values())
         if len(found) > 1:  # `multi_OrderOfXYZCl_zxy` is meant by `..._order_of_xyz zxy`
             kinds = {name: name.split("_")[-2].removesuffix("Cl").lower() for name in names}
@@ -116,9 +123,16 @@ class Parameters:
             return 1 / math.sqrt(radius) if radius > 0 else 0.0
         if name in ("rotationMatrix", "rotationMatrix2"):
             return rotation(self.read("transf_rotation" + name.removeprefix("rotationMatrix")))
-        if name.endswith("Matrix") or path.startswith("genFoldBox"):
+        if name.endswith("Matrix"):
             raise UnknownFieldError(path)
         return None
+
+    def _of_fold(self, name: str) -> Found | None:
+        kind, _, solid = name.partition("_")
+        found = faces(solid)
+        if kind in ("Nv", "sides") and found is None:
+            raise UnknownFieldError(f"genFoldBox.{name}")
+        return found if kind == "Nv" else float(len(found)) if found and kind == "sides" else None
 
     def _of_box(self, name: str, indices: Sequence[int]) -> Found | None:
         outer, inner = (_scalar(self.read(key)) ** 2 for key in _RADII)

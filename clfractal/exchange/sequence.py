@@ -7,10 +7,9 @@ gives the point; so they have one application more. Where that is not the same, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
-from clfractal.errors import FileError, Where
+from clfractal.errors import FileError
 from clfractal.exchange.counterparts import counterpart
 from clfractal.exchange.ends import (
     BAILOUT,
@@ -20,70 +19,33 @@ from clfractal.exchange.ends import (
     distance_to_middle,
     distance_to_planes,
 )
-from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
+from clfractal.exchange.installed import ADD_THEMSELVES, Installed
 from clfractal.exchange.measure import measured
-from clfractal.exchange.parameters import rotation
-from clfractal.exchange.placing import angles_of
-from clfractal.exchange.settings import SLOTS, Section, Settings
-from clfractal.exchange.translate import NO_FOLDS, Folds, KeepsError, Space
-from clfractal.exchange.translated import STAYS, Addition, Following, NeedsFourError, Text, text_of
-from clfractal.exchange.view import is_mirrored
+from clfractal.exchange.plan import (
+    MOST_ITERATIONS,
+    TRANSFORMS,
+    Place,
+    Plan,
+    Slot,
+    plan_of,
+    slot_of,
+    used_slots,
+)
+from clfractal.exchange.settings import SLOTS, Settings
+from clfractal.exchange.translate import NO_FOLDS, KeepsError, Space
+from clfractal.exchange.translated import STAYS, Following, NeedsFourError, Text, text_of
 
-MOST_ITERATIONS = 1_000_000
 MOST_LINKS = 63
 FOLLOWED = 260
 """Applications that are followed one by one; those after them are as the last ones."""
-_NEVER = 250
-"""`formula_stop_iteration` of a formula that goes on to the end; a file may have more iterations."""
-_TRANSFORMS = 1000
-_SHAPES = range(600, 800)
 _CHOSEN = (2, 20)
 """The first version whose files choose what a distance is made by."""
 
 
-@dataclass(frozen=True, slots=True)
-class Slot:
-    """A formula of a file, and its turns: from `start` to `stop`, both included."""
-
-    slot: int
-    number: int
-    adds: bool
-    count: int
-    start: int
-    stop: int
-    weight: float = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Plan:
-    """What all formulas of a file have in common."""
-
-    settings: Settings
-    most: int
-    julia: tuple[float, ...] | None
-    factors: tuple[float, ...]
-    w: float
-    mirrored: bool
-    repeats: tuple[float, ...]
-    folds: Folds
-    installed: Installed | None
-    remarks: list[str]
-    hollow: bool | None = None
-
-    def addition(self, slot: Slot) -> Addition:
-        """What is added after a formula."""
-        if not slot.adds or slot.weight == 0:
-            return Addition()
-        swapped = slot.number in ADD_SWAPPED
-        if self.julia is None:
-            return Addition(factors=self.factors, swapped=swapped)
-        return Addition(constant=self.julia, swapped=swapped)
-
-
 def formula_of(
     settings: Settings, installed: Installed | None, remarks: list[str], *, hollow: bool | None = None
-) -> dict[str, Any]:
-    """The section `formula` of a scene.
+) -> dict[str, Any] | str:
+    """The section `formula` of a scene; `none` where the first of joined formulas has a place of its own.
 
     Args:
         installed: where texts of formulas are read; None: there are none.
@@ -94,21 +56,20 @@ def formula_of(
     """
     main = settings.main
     joined = main.flag("boolean_operators", False)
+    place = Place.of(main, 1) if joined else Place()
+    if place.is_elsewhere:
+        return "none"  # it is an object as the others are
     hybrid = main.flag("hybrid_fractal_enable", False) and not joined
-    used = _used(settings, hybrid, joined)
-    slots = [_slot(settings, slot, remarks, hybrid=hybrid) for slot in used]
+    used = used_slots(settings, hybrid, joined)
+    slots = [slot_of(settings, slot, remarks, hybrid=hybrid) for slot in used]
     for slot in slots:
         if slot.weight not in (0, 1):
             remarks.append(f"formula_weight_{slot.slot}: its map is not blended with z by {slot.weight:g}")
-    if joined:
-        _note_places(settings, 1, remarks, ("position", "rotation", "repeat"))
-        if main.number("formula_scale_1", 1.0) != 1:
-            remarks.append("formula_scale_1: the first formula keeps its own size")
-    else:
+    if not joined:
         main.without(main.beginning("formula_scale_"))
     if not hybrid:
         main.without(main.beginning("formula_weight_"))
-    plan = _plan(settings, "_1" if joined else "", installed, remarks, hollow)
+    plan = plan_of(settings, 1 if joined else None, place, installed, remarks, hollow)
     alone = len(slots) == 1 and hollow is None and (installed is None or slots[0].number not in DISCS)
     section = _by_library(plan, slots[0]) if alone else None
     if section is None:
@@ -119,41 +80,35 @@ def formula_of(
 
 
 def joined_of(settings: Settings, installed: Installed | None, remarks: list[str]) -> dict[str, Any]:
-    """The other formulas of a file that joins them, as objects of a scene; those that have no counterpart are told.
+    """The formulas of a file that joins them, as objects of a scene, but for a first one that is the scene's own.
+
+    Those after it that have no counterpart are told.
 
     Raises:
-        FileError: a value is none of its kind.
+        FileError: a value is none of its kind, or the first formula has no counterpart.
     """
     main = settings.main
     found: dict[str, Any] = {}
     if not main.flag("boolean_operators", False):
         return found
-    for slot in range(2, SLOTS + 1):
-        if main.whole(f"formula_{slot}", 0) == 0:
+    for slot in range(1, SLOTS + 1):
+        if main.whole(f"formula_{slot}", 2 if slot == 1 else 0) == 0:
             main.without(main.beginning(f"formula_scale_{slot}", f"formula_position_{slot}"))
             continue
-        joins = _JOINS.get(main.whole(f"boolean_operator_{slot - 1}", 1), "union")
+        place = Place.of(main, slot)
+        if slot == 1 and not place.is_elsewhere:
+            continue
+        joins = "union" if slot == 1 else _JOINS.get(main.whole(f"boolean_operator_{slot - 1}", 1), "union")
         try:
-            plan = _plan(settings, f"_{slot}", installed, remarks)
-            one = _slot(settings, slot, remarks)
+            plan = plan_of(settings, slot, place, installed, remarks)
+            one = slot_of(settings, slot, remarks)
             section = _by_library(plan, one) or _by_texts(plan, [one], 1)
         except FileError as error:
+            if slot == 1:
+                raise
             remarks.append(str(error).removeprefix(f"{settings.file}:"))
             continue
-        size = max(main.number(f"formula_scale_{slot}", 1.0), 1e-6)
-        _note_places(settings, slot, remarks, ("repeat",))
-        position = list(main.vector(f"formula_position_{slot}"))
-        placed = {
-            "type": "formula",
-            "formula": section,
-            "position": position,
-            "scale": size,
-            "join": joins,
-        }
-        angles = angles_of(rotation(main.vector(f"formula_rotation_{slot}")))
-        if any(angles):
-            placed["rotation"] = angles
-        found[f"formula {slot}"] = placed
+        found[f"formula {slot}"] = {"type": "formula", "formula": section, **place.keys, "join": joins}
     _without_others(settings)
     return found
 
@@ -161,97 +116,10 @@ def joined_of(settings: Settings, installed: Installed | None, remarks: list[str
 _JOINS = {0: "intersection", 1: "union", 2: "cut"}
 
 
-def _plan(
-    settings: Settings,
-    suffix: str,
-    installed: Installed | None,
-    remarks: list[str],
-    hollow: bool | None = None,
-) -> Plan:
-    """What holds for all formulas, or with a suffix for one of them."""
-    main = settings.main
-    factors = main.vector(f"fractal_constant_factor{suffix}", (1, 1, 1))
-    constant = main.vector(f"julia_c{suffix}")
-    julia = tuple(c * f for c, f in zip(constant, factors, strict=True))
-    wanted = main.flag(f"julia_mode{suffix}", False)
-    most = min(max(main.whole("N", 250), 1), MOST_ITERATIONS)
-    w = main.number(f"initial_waxis{suffix}", 0.0)
-    return Plan(
-        settings,
-        most,
-        julia if wanted else None,
-        factors,
-        w,
-        is_mirrored(settings),
-        tuple(max(each, 0.0) for each in main.vector("repeat")),
-        _folds(main),
-        installed,
-        remarks,
-        hollow,
-    )
-
-
-def _folds(main: Section) -> Folds:
-    """What is done to z before each application."""
-    box = (main.number("box_folding_limit", 1.0), main.number("box_folding_value", 2.0))
-    ball = (main.number("spherical_folding_inner", 0.5), main.number("spherical_folding_outer", 1.0))
-    return Folds(
-        box if main.flag("box_folding", False) else None,
-        ball if main.flag("spherical_folding", False) else None,
-    )
-
-
-def _note_places(settings: Settings, slot: int, remarks: list[str], parts: Sequence[str]) -> None:
-    for part in parts:
-        key = f"formula_{part}_{slot}"
-        if any(settings.main.vector(key)):
-            remarks.append(f"{key}: is not taken over")
-
-
 def _without_others(settings: Settings) -> None:
     """What nobody asked for belongs to other formulas."""
     for slot in range(1, SLOTS + 1):
         settings.fractal(slot).without(settings.fractal(slot).entries)
-
-
-def _used(settings: Settings, hybrid: bool, joined: bool) -> list[int]:
-    """The numbers of the slots that have a turn."""
-    main = settings.main
-    if joined:
-        return [1]
-    if not hybrid:
-        main.without(key for key in main.beginning("formula_") if not key.endswith("_1"))
-        main.without((*main.beginning("fractal_enable_"), *main.beginning("formula_i", "formula_st")))
-        return [1]
-    numbers = [slot for slot in range(1, SLOTS + 1) if main.flag(f"fractal_enable_{slot}", True)]
-    used = [slot for slot in numbers if main.whole(f"formula_{slot}", 2 if slot == 1 else 0) != 0]
-    for slot in set(range(1, SLOTS + 1)) - set(used):
-        main.without(key for key in main.beginning("formula_") if key.endswith(f"_{slot}"))
-    if not used:
-        raise FileError("has no formula: all are 0 or not enabled", Where(settings.file))
-    return used
-
-
-def _slot(settings: Settings, slot: int, remarks: list[str], *, hybrid: bool = False) -> Slot:
-    main = settings.main
-    key = f"formula_{slot}"
-    number = main.whole(key, 2 if slot == 1 else 0)
-    if number <= 0:
-        raise FileError("no formula is chosen", main.where(key))
-    adds = not (number in ADD_NOTHING or number >= _TRANSFORMS or number in _SHAPES)
-    if main.flag(f"dont_add_c_constant_{slot}", False):
-        adds = not adds
-    if not main.flag(f"check_for_bailout_{slot}", True):
-        remarks.append(f"check_for_bailout_{slot}: every application is compared with the bailout")
-    return Slot(
-        slot,
-        number,
-        adds and number not in ADD_THEMSELVES,
-        max(main.whole(f"formula_iterations_{slot}", 1), 1),
-        max(main.whole(f"formula_start_iteration_{slot}", 0), 0),
-        main.whole(f"formula_stop_iteration_{slot}", _NEVER),
-        main.number(f"formula_weight_{slot}", 1.0) if hybrid else 1.0,
-    )
 
 
 def _by_library(plan: Plan, slot: Slot) -> dict[str, Any] | None:
@@ -300,7 +168,7 @@ def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
         for link in links:
             link["formula"] = {**link["formula"], "slice": {"w": plan.w}}
     plan.settings.origins.extend(_origins(slots, texts))
-    return measured(links, plan.most + standing, plan.settings)
+    return measured(links, plan.most + standing, plan.reach, plan.repeats)
 
 
 def _begins_at_point(plan: Plan, followed: Sequence[dict[str, Any]]) -> bool:
@@ -359,7 +227,7 @@ def _last(plan: Plan, slots: Sequence[Slot], texts: dict[int, Text]) -> str | No
         (DISCS, ("3", "pseudo_kleinian"), distance_to_disc),
         (PLANES, ("4", "jos_kleinian"), distance_to_planes),
     )
-    own = [slot for slot in slots if slot.number < _TRANSFORMS]
+    own = [slot for slot in slots if slot.number < TRANSFORMS]
     for kind, names, distance in kinds:
         fits = not chosen or wanted in ("", "0", "preferred", *names)
         if own and fits and all(slot.number in kind for slot in own):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -9,21 +10,28 @@ from clfractal.exchange.look import decoded
 from clfractal.exchange.parameters import rotation
 from clfractal.exchange.placing import angles_of
 from clfractal.exchange.settings import Section
+from clfractal.exchange.solid_formulas import Wanted, as_formula, can_be_formula, size_of
 
-MOST = 64
+MOST, MOST_FORMULAS = 64, 8
+_FLAT = 1e-4
+"""How thick what has no thickness is, as a part of its size."""
 _BEGIN = "primitive_"
 _GREY = (0xC350, 0xC350, 0xC350)
 
 Vector = tuple[float, ...]
 
 
-def solids_of(main: Section, remarks: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+def solids_of(main: Section, joined: int, remarks: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
     """The sections `objects` and `materials` of a scene.
+
+    Args:
+        joined: how many other objects are formulas.
 
     Raises:
         FileError: a value is none of its kind.
     """
     objects: dict[str, Any] = {}
+    formulas = joined
     materials: dict[str, Any] = {}
     for kind, number in _enabled(main):
         key = f"{_BEGIN}{kind}_{number}_"
@@ -34,17 +42,50 @@ def solids_of(main: Section, remarks: list[str]) -> tuple[dict[str, Any], dict[s
             continue
         found = make(main, key)
         objects[f"{kind} {number}"] = found
-        for part in ("repeat", "empty"):
-            if part == "empty" and main.flag(key + part, False):
-                remarks.append(f"{key}{part}: it is a solid, not a shell")
-            if part == "repeat" and any(main.vector(key + part)):
-                remarks.append(f"{key}{part}: it is there once")
         name = f"material {main.whole(key + 'material_id', 1)}"
         if name != "material 1" or f"{key}color" in main.entries:
             name = name if f"{key}color" not in main.entries else f"{kind} {number}"
             materials[name] = _material(main, key, name)
             found["material"] = name
+        wanted = _wanted(main, key, found)
+        if can_be_formula(found) and not wanted.is_plain:
+            if formulas < MOST_FORMULAS:
+                objects[f"{kind} {number}"] = as_formula(found, wanted, _reach(main, found["position"]))
+                formulas += 1
+            else:
+                remarks.append(f"{key}enabled: it is plain, as no more objects can be formulas")
     return objects, materials
+
+
+def _wanted(main: Section, key: str, solid: dict[str, Any]) -> Wanted:
+    """What a solid has beside its size."""
+    hollow = main.flag(key + "empty", False)
+    rounding = main.number(key + "rounding", 0.0) if solid["type"] == "box" and not hollow else 0.0
+    return Wanted(
+        tuple(max(each, 0.0) for each in main.vector(key + "repeat")),
+        hollow,
+        solid["type"] in ("cylinder", "cone") and not main.flag(key + "caps", True),
+        min(max(rounding, 0.0), 1e6),
+        _is_cut(main, solid),
+    )
+
+
+def _is_cut(main: Section, solid: dict[str, Any]) -> bool:
+    """Whether it reaches out of the limits, to which all is cut."""
+    if not can_be_formula(solid) or not main.flag("limits_enabled", False):
+        return False
+    low, high = main.vector("limit_min", (-10, -10, -10)), main.vector("limit_max", (10, 10, 10))
+    size = size_of(solid)
+    return any(
+        place - size < a or place + size > b for place, a, b in zip(solid["position"], low, high, strict=True)
+    )
+
+
+def _reach(main: Section, place: Vector) -> float:
+    """How far from a place anything is seen."""
+    return math.dist(main.vector("camera", (3, -6, 2)), place) + max(
+        main.number("view_distance_max", 50.0), 0.1
+    )
 
 
 def _enabled(main: Section) -> Iterable[tuple[str, int]]:
@@ -104,20 +145,17 @@ def _sphere(main: Section, key: str) -> dict[str, Any]:
 
 
 def _box(main: Section, key: str) -> dict[str, Any]:
-    main.without([key + "rounding"])
     sides = [max(each, 1e-6) for each in main.vector(key + "size", (1, 1, 1))]
     return _placed(main, key, "box", size=sides)
 
 
 def _cylinder(main: Section, key: str) -> dict[str, Any]:
-    main.without([key + "caps"])
     return _placed(
         main, key, "cylinder", radius=_size(main, key + "radius"), height=_size(main, key + "height")
     )
 
 
 def _cone(main: Section, key: str) -> dict[str, Any]:
-    main.without([key + "caps"])
     height = _size(main, key + "height")
     return _placed(main, key, "cone", height / 2, radius=_size(main, key + "radius"), height=height)
 
@@ -126,6 +164,16 @@ def _torus(main: Section, key: str) -> dict[str, Any]:
     radius, tube = _size(main, key + "radius"), _size(main, key + "tube_radius", 0.2)
     main.without([key + "radius_lpow", key + "tube_radius_lpow"])
     return _placed(main, key, "torus", radius=radius, tube=min(tube, radius))
+
+
+def _circle(main: Section, key: str) -> dict[str, Any]:
+    radius = _size(main, key + "radius")
+    return _placed(main, key, "cylinder", radius=radius, height=_FLAT * radius)
+
+
+def _rectangle(main: Section, key: str) -> dict[str, Any]:
+    width, height = _size(main, key + "width"), _size(main, key + "height")
+    return _placed(main, key, "box", size=[width, height, _FLAT * (width + height)])
 
 
 def _plane(main: Section, key: str) -> dict[str, Any]:
@@ -149,6 +197,8 @@ _MAKERS: dict[str, Callable[[Section, str], dict[str, Any]]] = {
     "cylinder": _cylinder,
     "cone": _cone,
     "torus": _torus,
+    "circle": _circle,
+    "rectangle": _rectangle,
     "plane": _plane,
     "water": _water,
 }

@@ -303,7 +303,8 @@ class Run(Values):
 
     def _statement_declare(self, statement: Statement) -> None:
         if statement.type == POINTER:
-            self.names[statement.name] = self.value(statement.values[0])
+            # One that leads nowhere yet is given its place later.
+            self.names[statement.name] = self.value(statement.values[0]) if statement.values else NOTHING
             return
         value: object
         size = SIZES.get(statement.type, 1)

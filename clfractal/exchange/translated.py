@@ -25,6 +25,8 @@ from clfractal.exchange.translate import (
     carried_name,
     first_state,
 )
+from clfractal.formulas.build_blocks import MAX_STATEMENTS
+from clfractal.formulas.build_orbit import MAX_LETS
 
 _TITLE = 60
 _STEP_SCALE = 0.7
@@ -136,12 +138,12 @@ class Following:
         key = (adds, *(part if isinstance(part, float) else (id(part),) for part in whole))
         if key not in self.found:
             try:
-                let, maps = written(whole, "v")
+                let, maps = written(whole, "v", most=MAX_STATEMENTS)
             except TooLargeError as error:
                 raise FileError(f"has no counterpart: {error}", Where(str(text.file))) from None
             formula = _formula(text, let, maps[:size], adds)
             formula |= self.carrying(dict(zip(done.carry, maps[size:], strict=True)))
-            self.found[key] = self.ending(formula, text.number in DISCS)
+            self.found[key] = with_room(self.ending(formula, text.number in DISCS))
         return self.found[key]
 
     @property
@@ -222,6 +224,20 @@ class Following:
 
 class NeedsFourError(Exception):
     """z does not stay in three dimensions."""
+
+
+def with_room(formula: dict[str, Any]) -> dict[str, Any]:
+    """A formula whose map has more parts than `let` has room for, as statements."""
+    let = formula.get("let", {})
+    if len(let) <= MAX_LETS:
+        return formula
+    state = formula.get("state", {})
+    after = dict(zip(formula["variables"], formula["map"], strict=True))
+    after |= {name: each["next"] for name, each in state.items()}
+    found = {key: value for key, value in formula.items() if key not in ("let", "map")}
+    if state:
+        found["state"] = {name: {"start": each["start"]} for name, each in state.items()}
+    return {**found, "do": [*({name: part} for name, part in let.items()), after]}
 
 
 def _formula(text: Text, let: Mapping[str, str], maps: Sequence[str], adds: bool) -> dict[str, Any]:

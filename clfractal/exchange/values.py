@@ -9,7 +9,7 @@ from clfractal.exchange.arithmetic import NOTHING, Arithmetic, Nothing, Place, T
 from clfractal.exchange.c_text import SIZES, Expression
 from clfractal.exchange.functions import NUMBERS, call_function
 from clfractal.exchange.parameters import IGNORED, Parameters, UnknownFieldError
-from clfractal.exchange.symbols import Value
+from clfractal.exchange.symbols import Symbol, Value
 
 
 @dataclass
@@ -84,21 +84,24 @@ class Values(Arithmetic):
     def path(self, expression: Expression) -> tuple[str | None, list[int]]:
         """The path of a parameter, and its indices; None for what is none."""
         parts: list[str] = []
-        indices: list[int] = []
+        asked: list[Expression] = []
         here = expression
         while here.kind in ("member", "item"):
             if here.kind == "member":
                 parts.insert(0, here.name)
             else:
-                index = self.value(here.parts[1])
-                self.computed |= isinstance(index, Turn)
-                if not isinstance(index, float):
-                    self.refuse("an index that depends on z")
-                indices.insert(0, int(index))
+                asked.insert(0, here.parts[1])
             here = here.parts[0]
-        if here.kind == "name" and here.name == "fractal":
-            return ".".join(parts), indices
-        return None, []
+        if here.kind != "name" or here.name != "fractal":
+            return None, []
+        indices: list[int] = []
+        for each in asked:
+            index = self.value(each)
+            self.computed |= isinstance(index, Turn)
+            if not isinstance(index, float):
+                self.refuse("an index that depends on z")
+            indices.append(int(index))
+        return ".".join(parts), indices
 
     def parameter(self, path: str, indices: list[int], expression: Expression) -> object:
         """A parameter's value, or a component of it."""
@@ -135,7 +138,18 @@ class Values(Arithmetic):
             return NOTHING
         if isinstance(array, list) and isinstance(index, float) and 0 <= index < len(array):
             return array[int(index)]
+        if isinstance(array, list) and array and isinstance(index, Symbol):
+            return self.picked(array, index)
         return self.refuse("this part of an array")
+
+    def picked(self, array: list[object], index: Value) -> object:
+        """The part of an array at an index that conditions choose; where it is outside nobody asks for the part."""
+        if isinstance(index, float):
+            return array[int(index)] if 0 <= index < len(array) else array[0]
+        if index.operation != "where":
+            self.refuse("an index that depends on z")
+        condition, yes, no = index.parts
+        return self.merged(condition, self.picked(array, yes), self.picked(array, no))
 
     def _value_address(self, expression: Expression) -> object:
         inner = expression.parts[0]

@@ -1,11 +1,10 @@
-"""What needs a formula, and is refused in a scene of objects alone, `formula: none`."""
+"""What needs a formula, and is refused in a scene of `formula: none` without formulas among its objects."""
 
 from collections.abc import Iterator
 
 from clfractal.elements.lights.set import SetLight
 from clfractal.errors import SceneError, Where
 from clfractal.scene.model import Scene
-from clfractal.scene.objects import FormulaObject
 from clfractal.scene.renderer import Renderer
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
@@ -16,12 +15,14 @@ from clfractal.schema.shape import Joined
 
 def check_alone(scene: Scene) -> None:
     """Raises SceneError, with a dotted path, for what needs a formula where there is none."""
-    if scene.has_set:
+    if not scene.chain.alone:
         return
     renderer, name = scene.renderer, scene.chain.first.formula.name
     if not isinstance(renderer, SurfaceRenderer) and not _shows_a_file(renderer):
         message = f"{name} is for surface renderers, got a {renderer.type}; name a formula"
         raise SceneError(message, Where(path="formula"))
+    if scene.has_set:
+        return
     for path, what, way_out in _asking(scene):
         raise SceneError(f"{what} a formula, and the scene's is {name}; {way_out}".lstrip(), Where(path=path))
 
@@ -49,7 +50,5 @@ def _asking(scene: Scene) -> Iterator[tuple[str, str, str]]:
             if opacity is not None and opacity > 0:
                 yield f"cut_planes.{number}.{key}", "shows counts of", "0 only cuts objects"
     for name, item in scene.objects.items():
-        if isinstance(item, FormulaObject):
-            yield f"objects.{name}.type", "formula joins its set to that of", "make it the scene's own"
-        elif isinstance(item, Joined) and item.join != "union":
+        if isinstance(item, Joined) and item.join != "union":
             yield f"objects.{name}.join", f"{item.join} needs", "remove it, and the object stands for itself"

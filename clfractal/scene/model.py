@@ -5,6 +5,7 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 """
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
@@ -161,8 +162,8 @@ class Scene(Section):
 
     @property
     def has_set(self) -> bool:
-        """Whether there is a set beside the objects: `formula: none` has none."""
-        return not self.chain.alone
+        """Whether rays look for a set: `formula: none` has none, but for formulas among its objects."""
+        return not self.chain.alone or any(isinstance(each, FormulaObject) for each in self.objects.values())
 
     @property
     def bounds(self) -> tuple[Vector, float]:
@@ -178,15 +179,14 @@ class Scene(Section):
         """
         if not self.has_set:
             return ball_around(self.objects.values(), lambda each: _ball_of_grid(each, self.grids[each.file]))
-        found = self.chain.center, self.chain.radius
+        balls = [] if self.chain.alone else [(self.chain.center, self.chain.radius)]
         for name, part in self.joined.items():
             if isinstance(part, FormulaObject) and part.join in ("union", "smooth_union"):
-                found = ball_of_both(
-                    found, part.ball(self.joined_chains[name].center, self.joined_chains[name].radius)
-                )
+                chain = self.joined_chains[name]
+                balls.append(part.ball(chain.center, chain.radius))
             elif isinstance(part, Solid) and part.join in ("union", "smooth_union"):
-                found = ball_of_both(found, part.ball)
-        return found
+                balls.append(part.ball)
+        return reduce(ball_of_both, balls or [(self.chain.center, self.chain.radius)])
 
     @property
     def joined(self) -> "Mapping[str, Joined]":

@@ -307,18 +307,21 @@ class TestSolids:
             "primitive_sphere_1_enabled true;\nprimitive_sphere_1_position 3 0 0;\nprimitive_box_2_enabled true;\n"
             "primitive_box_2_size 1 2 3;\nprimitive_box_2_material_id 2;\nmat2_surface_color ffff 0 0;\n"
             "primitive_cone_1_enabled true;\nprimitive_cone_1_height 2;\nprimitive_water_1_enabled true;\n"
-            "primitive_water_1_length 0.5;\nprimitive_rectangle_1_enabled true;\nprimitive_torus_1_radius 3;"
+            "primitive_water_1_length 0.5;\nprimitive_rectangle_1_enabled true;\nprimitive_rectangle_1_width 3;\n"
+            "primitive_circle_1_enabled true;\nprimitive_prism_1_enabled true;\nprimitive_torus_1_radius 3;"
         )
         found = imported(f"{CAMERA}\nlegacy_coordinate_system false;\n{keys}")
         scene = load_scene(found.scene)
         assert found.scene["objects"] == {
             "box 2": {"type": "box", "position": [0, 0, 0], "size": [1, 2, 3], "material": "material 2"},
+            "circle 1": {"type": "cylinder", "position": [0, 0, 0], "radius": 1, "height": 1e-4},
             "cone 1": {"type": "cone", "position": [0, 0, 1], "radius": 1, "height": 2},
+            "rectangle 1": {"type": "box", "position": [0, 0, 0], "size": [3, 1, 4e-4]},
             "sphere 1": {"type": "sphere", "position": [3, 0, 0], "radius": 1},
             "water 1": {"type": "water", "position": [0, 0, 0], "waves": {"height": 0.1, "length": 0.5}},
         }
         assert scene.materials["material 2"].base.color == (1, 0, 0)
-        assert found.remarks == ("primitive_rectangle_1_enabled: there is no rectangle among our objects",)
+        assert found.remarks == ("primitive_prism_1_enabled: there is no prism among our objects",)
 
     def test_a_rotation_turns_as_their_matrix_does(self) -> None:
         from clfractal.elements.shapes.box import BoxObject

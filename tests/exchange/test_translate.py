@@ -13,7 +13,8 @@ from clfractal.exchange.c_text import read_formula
 from clfractal.exchange.counterparts import counterpart
 from clfractal.exchange.defaults import default_of
 from clfractal.exchange.parameters import Parameters, rotation
-from clfractal.exchange.sequence import Slot, turns
+from clfractal.exchange.plan import Slot
+from clfractal.exchange.sequence import turns
 from clfractal.exchange.settings import parse_settings
 from clfractal.exchange.symbols import Symbols, written
 from clfractal.formulas.backends import NumpyBackend
@@ -266,7 +267,10 @@ class TestRefusals:
                 "has no counterpart: z depends on distances or colours",
             ),
             ("z.x = aux->DE;", "has no counterpart: z depends on distances or colours"),
-            ("z.x = fractal->genFoldBox.type;", "has no counterpart: the parameter genFoldBox.type"),
+            (
+                "z.x = fractal->genFoldBox.sides_ball;",
+                "has no counterpart: the parameter genFoldBox.sides_ball",
+            ),
             ("z.x = nowhere;", "has no counterpart: the name nowhere"),
             ("goto end; end: z.x = 1.0f;", "has no counterpart: Goto is outside of the C that is read"),
             (

@@ -83,6 +83,33 @@ def test_a_picture_has_the_bits_of_one_with_a_set_that_nobody_sees(
     assert shown[0]["R"].std() > 0.01
 
 
+@pytest.mark.parametrize("mode", one_of("direct", "path"))
+def test_a_formula_among_the_objects_is_as_the_scene_s_own(device: Device, mode: str) -> None:
+    bulb = {"name": "mandelbulb", "iterations": 5}
+    part = {"type": "formula", "formula": bulb, "position": [0.3, 0.2, -0.1], "scale": 1.0}
+    moved = {**part, "position": [0, 0, 0]}
+    sections: dict[str, Any] = {
+        "lighting": {"mode": mode},
+        "renderer": {"samples": 4},
+        "background": [0.1, 0.2, 0.3],
+    }
+    own, alone = (
+        shoot(scene_of(formula, PERSPECTIVE, (48, 40), objects=objects, **sections), device)
+        for formula, objects in ((bulb, {}), ("none", {"bulb": moved}))
+    )
+    hit = own["A"] == 1
+    assert hit.mean() > 0.1
+    assert (hit != (alone["A"] == 1)).mean() < 0.01
+    both = hit & (alone["A"] == 1)
+    # (Within a fifth of a pixel: each march ends in its own place of a footprint.)
+    assert np.median(abs(own["Z"][both] - alone["Z"][both])) < 0.01
+    # Nothing is seen of the empty set, which stands where rays go.
+    beside = shoot(
+        scene_of("none", PERSPECTIVE, (48, 40), objects={"bulb": {**part, "position": [0, 0, 50]}}), device
+    )
+    assert beside["A"].max() == 0
+
+
 def test_a_ball_is_where_its_equation_is_zero(device: Device) -> None:
     scene = scene_of("none", PERSPECTIVE, (48, 40), objects={"ball": {"radius": 0.8}}, background=[0, 0, 0])
     framebuffer = shoot(scene, device)

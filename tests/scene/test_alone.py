@@ -11,6 +11,7 @@ import clfractal
 from clfractal.errors import ClfractalError, FormulaError, SceneError
 from clfractal.files.volume_file import Volume, write_volume
 from clfractal.formulas.catalog import description, names
+from clfractal.scene.checks import inside_solid
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.schema.kinds import members
 from tests.scene.errors import cases, error_of, marked
@@ -19,8 +20,6 @@ from tests.shell import InProcess
 
 HEAD_DATA = {"version": 1, "camera": {}}
 ALONE = HEAD.replace("{name: mandelbulb}", "none")
-OTHER = "type: formula, formula: {name: hast}"
-
 # In the texts below the sign § stands where the message must point to.
 CASES = cases(
     """
@@ -40,10 +39,7 @@ objects: {b: {join: §cut}}
 => objects.b.join: cut needs a formula, and the scene's is none; remove it, and the object stands for itself
 layout: {views: [{}, {coloring: {by: §trap}}]}
 => layout.views.1.coloring.by: trap needs a formula, and the scene's is none; use solid, normal or residual
-objects: {b: {«OTHER»}}
-=> objects.b.type: formula joins its set to that of a formula, and the scene's is none; make it the scene's own
 """,
-    OTHER=OTHER.replace("formula,", "§formula,", 1),
 )
 
 
@@ -59,6 +55,8 @@ def test_messages(text: str, expected: str) -> None:
         ("{chain: [{name: mandelbulb}, {name: §none}]}", ".chain.1.name: none cannot be a member of a chain; remove it"),
         ("{name: none, parameters: {§power: 2}}", ".parameters.power: unknown parameter 'power'; known: none"),
         ("§none\nrenderer: {type: volume}", ": none is for surface renderers, got a volume; name a formula"),
+        ("§none\nobjects: {b: {type: formula, formula: {name: hast}}}\nrenderer: {type: volume}",
+         ": none is for surface renderers, got a volume; name a formula"),
         ("§none\nrenderer: {type: cut_plane}", ": none is for surface renderers, got a cut_plane; name a formula"),
         ("§none\nlayout: {views: [{}, {renderer: {type: volume}}]}",
          ": none is for surface renderers, got a volume; name a formula (for layout.views.1)"),
@@ -131,6 +129,35 @@ def test_a_camera_frames_all_objects_that_have_an_end(tmp_path: Path) -> None:
     assert scene.bounds[0] == pytest.approx((0, 9, 0))
     assert scene.bounds[1] == pytest.approx(3**0.5)
     assert load_scene(ALONE).bounds == ((0, 0, 0), 1)
+
+
+FORMULAS = """objects:
+  a: {type: formula, formula: {name: hast}, position: [3, 0, 0], scale: 0.5, rotation: [0, 0, 90]}
+  b: {type: formula, formula: {name: menger_sponge}, position: [-1, 0, 0], join: %s}
+  c: {join: cut, radius: 0.1}
+coloring: {by: trap}
+glow: {}
+"""
+
+
+@pytest.mark.parametrize("join", ["union", "cut"])
+def test_formulas_may_be_among_the_objects(join: str) -> None:
+    scene = load_scene(ALONE + FORMULAS % join)
+    assert scene.has_set
+    assert list(scene.joined) == ["a", "b", "c"]
+    own = load_scene(HEAD.replace("mandelbulb", "hast"))
+    # The scene's own formula has no part in it.
+    if join == "cut":
+        assert scene.bounds[0] == (3, 0, 0)
+        assert scene.bounds[1] == pytest.approx(0.5 * own.bounds[1])
+    else:
+        assert scene.bounds[1] < 4 + own.bounds[1]
+    places = np.random.default_rng(1).uniform(-1, 1, (300, 3))
+    turned = 0.5 * places @ [[0, 1, 0], [-1, 0, 0], [0, 0, 1]] + [3, 0, 0]
+    held = inside_solid(own, places.tolist())
+    hole = np.linalg.norm(turned, axis=1) < 0.1
+    assert inside_solid(scene, turned.tolist()) == [a and not b for a, b in zip(held, hole, strict=True)]
+    assert inside_solid(scene, [(0.0, 0.0, 0.0), (0.001, 0.0, 0.0)]) == [False, False]
 
 
 def test_lights_may_be_where_a_set_would_be() -> None:

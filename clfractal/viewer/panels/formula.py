@@ -30,9 +30,9 @@ def draw(ui: Ui) -> None:
     if not w.filtering(ui):
         _choice(ui)
     w.problem(ui, "formula")
-    if not ui.studio.scene.has_set:
+    if chain.alone:
         if not w.filtering(ui):
-            w.hint(ui, "There is no formula: the scene shows objects alone.")
+            w.hint(ui, "There is no formula: the scene shows its objects.")
         return
     if root is not None:
         _members(ui, root)
@@ -77,7 +77,7 @@ def _choice(ui: Ui) -> None:
     w.in_row(4)
     w.act(ui, "formula", theme.CODE, "Edit it as text", on="formula_editor" in ui.show)
     w.in_row(4)
-    can_open = chain_path(ui) is None and ui.studio.scene.has_set
+    can_open = chain_path(ui) is None and not ui.studio.scene.chain.alone
     if w.icon_button(theme.LINK, "Make a chain of it: formulas in turn", enabled=can_open):
         _open_chain(ui)
     name = formula_library.chosen(ui, "##library", formula.name or "", single=False)
