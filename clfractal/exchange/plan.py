@@ -1,4 +1,4 @@
-"""What a settings file says of its formulas: whose turns they have, where they stand, what is added and folded."""
+"""What a settings file says of its formulas: their turns and places, and what is added and folded."""
 
 from __future__ import annotations
 
