@@ -10,9 +10,9 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+_LEAST = 1e-9
 _THIN = 2e-3
-"""How thick shells are, as a part of the solid's size."""
-_ACROSS = "sqrt(x*x + y*y)"
+"""How thick shells are to either side, as a part of the solid's least radius or half side."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,7 +47,7 @@ def as_formula(solid: Mapping[str, Any], wanted: Wanted, reach: float) -> dict[s
     """
     kind = solid["type"]
     size = _SIZES[kind](solid)
-    thick = _THIN * size
+    thick = _thickness(solid)
     shape = _SHAPES[kind](solid, wanted)
     if wanted.hollow and not wanted.open:
         shape = f"abs({shape}) - {_text(thick)}"
@@ -83,7 +83,7 @@ def _cell(axis: str, length: float) -> str:
 
 
 def _sphere(solid: Mapping[str, Any], _: Wanted) -> str:
-    return f"sqrt(x*x + y*y + z*z) - {_text(solid['radius'])}"
+    return f"{_length('x*x + y*y + z*z', solid)} - {_text(solid['radius'])}"
 
 
 def _box(solid: Mapping[str, Any], wanted: Wanted) -> str:
@@ -96,24 +96,38 @@ def _box(solid: Mapping[str, Any], wanted: Wanted) -> str:
 
 
 def _cylinder(solid: Mapping[str, Any], wanted: Wanted) -> str:
-    wall = f"{_ACROSS} - {_text(solid['radius'])}"
+    wall = f"{_across(solid)} - {_text(solid['radius'])}"
     return f"max({_wall(wall, solid, wanted)}, abs(z) - {_text(solid['height'] / 2)})"
 
 
 def _cone(solid: Mapping[str, Any], wanted: Wanted) -> str:
     radius, height = solid["radius"], solid["height"]
     slant = math.hypot(radius, height)
-    wall = f"{_text(height / slant)}*{_ACROSS} + {_text(radius / slant)}*(z - {_text(height / 2)})"
+    wall = f"{_text(height / slant)}*{_across(solid)} + {_text(radius / slant)}*(z - {_text(height / 2)})"
     return f"max({_wall(wall, solid, wanted)}, -{_text(height / 2)} - z)"
 
 
 def _torus(solid: Mapping[str, Any], _: Wanted) -> str:
-    ring = f"({_ACROSS} - {_text(solid['radius'])})"
+    ring = f"({_across(solid)} - {_text(solid['radius'])})"
     return f"sqrt({ring}*{ring} + z*z) - {_text(solid['tube'])}"
 
 
+def _across(solid: Mapping[str, Any]) -> str:
+    return _length("x*x + y*y", solid)
+
+
+def _length(squares: str, solid: Mapping[str, Any]) -> str:
+    # In the middle a root has no slope, of which distances are made, so there it is a coordinate.
+    return f"max(sqrt({squares}), x + {_text(_LEAST * solid['radius'])})"
+
+
 def _wall(wall: str, solid: Mapping[str, Any], wanted: Wanted) -> str:
-    return f"abs({wall}) - {_text(_THIN * size_of(solid))}" if wanted.open else wall
+    return f"abs({wall}) - {_text(_thickness(solid))}" if wanted.open else wall
+
+
+def _thickness(solid: Mapping[str, Any]) -> float:
+    sides = (side / 2 for side in (*solid.get("size", ()), solid.get("height", math.inf)))
+    return _THIN * min(*sides, solid.get("radius", math.inf), solid.get("tube", math.inf))
 
 
 _SHAPES: Mapping[str, Callable[[Mapping[str, Any], Wanted], str]] = {

@@ -94,7 +94,8 @@ def test_shells_and_tubes_are_thin() -> None:
     way = np.array([0.6, 0.0, -0.8])
     places = [(radius * way).tolist() for radius in (0.5, 1.49, 1.5, 1.51)]
     assert inside_solid(scene, places) == [False, False, True, False]
-    assert inside_solid(scene, [(0.9, 0.0, 1.2)]) == [False]  # beyond the limits
+    # In the middle, and beyond the limits.
+    assert inside_solid(scene, [(0.0, 0.0, 0.0), (0.9, 0.0, 1.2)]) == [False, False]
     # From outside a whole shell looks as a solid does.
     whole = import_text(settings(f"{CAMERA}\n{solid('sphere', radius='1.5', empty='true')}"), "x.fract")
     assert whole.scene["objects"]["sphere 1"]["type"] == "sphere"
@@ -102,8 +103,13 @@ def test_shells_and_tubes_are_thin() -> None:
         settings(f"{CAMERA}\n{solid('cylinder', radius='1', height='2', caps='false')}"), "x.fract"
     )
     scene = load_scene({**tube.scene, "formula": "none"})
-    places = [[0.1, 0, 0.5], [0.6, 0.8, 0.5], [0.5, 0, 0.999], [0.6, 0.8, 1.1]]
+    places = [[0, 0, 0.5], [0.6, 0.8, 0.5], [0.5, 0, 0.999], [0.6, 0.8, 1.1]]
     assert inside_solid(scene, places) == [False, True, False, False]
+    narrow = import_text(
+        settings(f"{CAMERA}\n{solid('cylinder', radius='1e-3', height='2', caps='false')}"), "x.fract"
+    )
+    scene = load_scene({**narrow.scene, "formula": "none"})
+    assert inside_solid(scene, [(5e-4, 0.0, 0.5), (0.0, 1e-3, 0.5)]) == [False, True]
 
 
 def test_at_most_eight_formulas() -> None:
