@@ -5,8 +5,8 @@
 Both write a PNG of the whole picture, with the file's own lights and shadows, one ray for each pixel (theirs knows no other
 number without its Monte Carlo effects, which are switched off with all else that ours does not take over: `NOT_OURS`). How
 fine its surface is stays as the file says; ours is found to a part of a pixel. The first picture of ours compiles the
-formula's program, and is told apart; then each makes one in turn, whose middle time counts. Where theirs does not end in
-the time given, it counts as that long.
+formula's program, and is told apart; then each makes one in turn, whose middle time counts. What does not end in the time
+given counts as that long.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ NOT_OURS = (
     "hdr_blur_enabled",
     *(f"aux_light_volumetric_enabled_{number}" for number in range(1, 5)),
 )
-HEAD = f"{'file':58} {'theirs':>8} {'ours':>8} {'ratio':>6} {'first':>8}"
+HEAD = f"{'file':58} {'theirs':>9} {'ours':>9} {'ratio':>6} {'first':>8}"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -71,9 +71,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             continue
         ratios.append(their / own)
         firsts.append(their / first)
-        more = ">" if their >= options.seconds else " "
+        more, less = (">" if each >= options.seconds else " " for each in (their, own))
         print(
-            f"{name:58} {more}{their:6.1f} s {own:6.2f} s {more}{ratios[-1]:5.2f} {first:6.2f} s", flush=True
+            f"{name:58} {more}{their:6.1f} s {less}{own:6.1f} s {ratios[-1]:6.2f} {first:6.1f} s", flush=True
         )
     if ratios:
         print(
@@ -105,7 +105,7 @@ def measured(path: Path, size: tuple[int, int], runs: int, seconds: float) -> tu
 
     Raises:
         theirs.TheirsError: it made no picture.
-        subprocess.SubprocessError: ours made none, or took too long.
+        subprocess.SubprocessError: ours made none.
     """
     off: dict[str, object] = dict.fromkeys(NOT_OURS, 0)
     with tempfile.TemporaryDirectory(prefix="speed-") as folder:
@@ -115,7 +115,10 @@ def measured(path: Path, size: tuple[int, int], runs: int, seconds: float) -> tu
 
         def ours() -> float:
             start = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True, timeout=seconds)
+            try:
+                subprocess.run(command, check=True, capture_output=True, timeout=seconds)
+            except subprocess.TimeoutExpired:
+                return seconds
             return time.perf_counter() - start
 
         def other() -> float:
@@ -129,7 +132,7 @@ def measured(path: Path, size: tuple[int, int], runs: int, seconds: float) -> tu
         first, their, own = ours(), [], []
         for _ in range(runs):
             own.append(ours())
-            picture.unlink()
+            picture.unlink(missing_ok=True)
             their.append(other())
     return statistics.median(their), statistics.median(own), first
 
