@@ -48,7 +48,7 @@ SCENES: Mapping[str, tuple[str, tuple[str, ...]]] = {
         ),
     ),
     "volume": (
-        "volume_jade.yaml",
+        "volume_alabaster.yaml",
         (
             "lighting={mode: direct}",
             "objects={}",

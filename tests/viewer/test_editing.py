@@ -22,7 +22,7 @@ SCENES = (
     "mandelbulb",
     "four_views",
     "stereo_bulb",
-    "volume_jade",
+    "volume_alabaster",
     "cut_mandelbrot",
     "lamplit_shells",
     "cobalt_mirror",

@@ -57,7 +57,7 @@ CASES: dict[str, tuple[str, Callable[[Ui], None], Callable[[Ui], None] | None]] 
     "lights": ("mandelbulb", scene_dock.draw, opened("lights", "camera")),
     "cut_planes": ("figure9", scene_dock.draw, opened("cut_planes", "stereo")),
     "objects": ("mandelbulb", scene_dock.draw, with_objects),
-    "volume": ("volume_jade", scene_dock.draw, opened("volume", "renderer")),
+    "volume": ("volume_alabaster", scene_dock.draw, opened("volume", "renderer")),
     "help": ("mandelbulb", draw_help, with_help),
 }
 

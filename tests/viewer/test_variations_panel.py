@@ -55,7 +55,7 @@ def settled(ui: Ui, stage: Stage) -> Any:
 # What is drawn
 
 
-@pytest.mark.parametrize("scene", [SCENE, "scenes/volume_jade.yaml", "scenes/cut_peacock.yaml"])
+@pytest.mark.parametrize("scene", [SCENE, "scenes/volume_alabaster.yaml", "scenes/cut_peacock.yaml"])
 def test_the_thread_draws_what_the_library_does(scene: str) -> None:
     base = load_scene(scene)
     drawn = Draw(base, "heavy", 5, frozenset(KINDS), lambda: None)
