@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import random
 import signal
@@ -12,8 +13,11 @@ from typing import TYPE_CHECKING
 import pytest
 from hypothesis import HealthCheck, settings
 
-from clfractal.device import drivers_folder
-from clfractal.device.select import Device, choose
+from clfractal.device import drivers_folder, select
+from clfractal.device.select import Device, choose, has_float64, is_simulator
+from clfractal.device.tune import first_lanes
+from clfractal.errors import ClfractalError
+from clfractal.integrators.lanes import LANES_VARIABLE
 
 if TYPE_CHECKING:
     from tests.shell import InProcess
@@ -29,6 +33,30 @@ pytest.register_assert_rewrite(
 
 # Where it belongs, although a test may be the first to use OpenCL that has a temporary folder of its own.
 drivers_folder.path()
+
+MOST_LANES = 8
+"""Wider packets take longer to compile than small pictures gain by them."""
+
+
+def _decide_once() -> None:
+    """The device and the lane count of all tests and of the processes that they start, unless the environment names them.
+
+    Users get what is fastest. What is measured beside other tests differs from process to process, also between formulas,
+    and with each other answer all programs are compiled once more. Tests of the choice take these variables away
+    (`nothing_decided`).
+    """
+    # What no process has measured: a test that measures devices would change the choice of those that start later.
+    with contextlib.suppress(ClfractalError), pytest.MonkeyPatch.context() as patch:
+        patch.setattr(select, "SPEEDS", "of no device")
+        device = choose()
+        os.environ.setdefault(select.ENVIRONMENT_VARIABLE, device.info.index)
+        if not os.environ.get(LANES_VARIABLE) and not is_simulator(device.info):
+            counts = [first_lanes(device, "float32")]
+            counts += [first_lanes(device, "float64")] if has_float64(device.info) else []
+            os.environ[LANES_VARIABLE] = str(min(MOST_LANES, *counts))
+
+
+_decide_once()
 
 # The same examples on every run: a failure must be repeatable on another machine.
 settings.register_profile(
@@ -76,6 +104,13 @@ def _keep_the_environment() -> None:
 def device() -> Device:
     """The device that pictures are rendered on: the one users get, or CLFRACTAL_DEVICE."""
     return choose()
+
+
+@pytest.fixture
+def nothing_decided(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Neither a device nor a lane count is named by the environment, as for users."""
+    monkeypatch.delenv(select.ENVIRONMENT_VARIABLE, raising=False)
+    monkeypatch.delenv(LANES_VARIABLE, raising=False)
 
 
 @pytest.fixture

@@ -18,6 +18,7 @@ from clfractal.engine.observer import Observer
 from clfractal.engine.run import Progress, run
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.kernel import Stage
+from clfractal.integrators.lanes import best_lanes
 from clfractal.integrators.state import state_numbers
 from clfractal.integrators.waves import stage_name, surface_stages
 from clfractal.scene.model import Scene
@@ -49,7 +50,7 @@ def observed(
 
 
 def test_stages_are_those_that_are_launched(device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
-    shown, lanes = scene(HAST, samples=2), accepted_lanes(device, "float32")[-1]
+    shown, lanes = scene(HAST, samples=2), best_lanes(device, "float32")
     plan, launched = plan_of(shown, device, lanes=lanes), Counter[str]()
     enqueue = Drawing._enqueue
 
@@ -81,8 +82,8 @@ def test_only_lanes_of_packets_wait_and_only_the_observed(
     shown = scene(formula, **renderer)
     alone, _ = observed(shown, device, 1, Observer())
     assert alone.waits == alone.orbit_waits == 0
-    packets = accepted_lanes(device, "float32")[1:]
-    for lanes in {*packets[:1], *packets[-1:]}:
+    narrow, usual = accepted_lanes(device, "float32")[1:2], best_lanes(device, "float32")
+    for lanes in {*narrow, usual} - {1}:
         state, seen = observed(shown, device, lanes, Observer())
         assert 0 < state.orbit_waits < (lanes - 1) * state.iterations
         assert state.iterations == pytest.approx(alone.iterations, rel=0.01)
@@ -95,7 +96,7 @@ def test_only_lanes_of_packets_wait_and_only_the_observed(
 
 def test_a_ray_by_itself_keeps_lanes_without_one_waiting(device: Device) -> None:
     """They wait in the march, for all its steps, and not in orbits."""
-    lanes = accepted_lanes(device, "float32")[-1]
+    lanes = best_lanes(device, "float32")
     shown = scene(BULB, (1, 1), search="steps")
     state, _ = observed(shown, device, lanes, Observer())
     assert state.steps > 0

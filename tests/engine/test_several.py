@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 import clfractal
 from clfractal.device import program
 from clfractal.device.select import Device, by_key, devices, is_simulator
+from clfractal.device.tune import first_lanes
 from clfractal.engine import several, sharing
 from clfractal.engine.job import Job
 from clfractal.engine.local_executor import LocalExecutor
@@ -25,7 +26,6 @@ from clfractal.engine.run import Result, WorkItem
 from clfractal.engine.several import SeveralExecutor
 from clfractal.engine.sharing import Shared
 from clfractal.integrators import lanes
-from clfractal.integrators.lanes import march_reports
 from tests.calls import counted
 from tests.engine.offers import Clock, offer
 from tests.engine.small_pictures import SCENE, same
@@ -207,7 +207,7 @@ def test_two_implementations(device: Device) -> None:
     for info in devices():
         with suppress(clfractal.DeviceError):
             if info.kind == "cpu" and not is_simulator(info):
-                march_reports(by_key(info.index, info.key), "float32")
+                first_lanes(by_key(info.index, info.key), "float32")
                 kinds.setdefault(info.key, info.index)
     if len(kinds) < 2:
         pytest.skip("two drivers of the processor that work are needed")
