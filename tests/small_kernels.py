@@ -10,9 +10,10 @@ import numpy.typing as npt
 import pyopencl as cl
 
 from clfractal.device import compiler, program
-from clfractal.device.select import Device
+from clfractal.device.select import Device, is_pocl
 from clfractal.device.source import flatten
 from clfractal.device.structs import Precision
+from clfractal.errors import KernelBuildError
 
 Floats = npt.NDArray[np.floating[Any]]
 
@@ -29,6 +30,17 @@ INLINE void store(__global scalar *to, real value) {
 }
 """
 """What kernels read and write their packets by, behind "formulas/numbers/real.h" or "device/vectors.h"."""
+
+
+def _built(device: Device, text: str, flags: Sequence[str]) -> Any:
+    """The program of a text: PoCL's files go into the cache, as those of the program's own texts do, so the next run of the
+    tests compiles nothing. Other drivers would be asked for a binary, for which they compile every kernel once more."""
+    if not is_pocl(device.info):
+        return compiler.compile_source(device, text, flags)
+    try:
+        return program.build(device, text, flags=flags, isolated=False).cl_program
+    except KernelBuildError as error:
+        raise compiler.BuildFailureError(error.details) from None
 
 
 class SmallKernels:
@@ -51,8 +63,7 @@ class SmallKernels:
             generated={"small.cl": text, **(generated or {})},
             defines={"LANES": lanes, "REAL_IS_DOUBLE": int(precision == "float64"), **(defines or {})},
         )
-        # Without the cache: asking for a binary makes drivers compile every kernel once more.
-        self._program = compiler.compile_source(device, flat.text, [*program.math_flags(precision), *flags])
+        self._program = _built(device, flat.text, [*program.math_flags(precision), *flags])
 
     def planes(self, numbers: npt.NDArray[Any], fill: float = 0.0) -> Floats:
         """Numbers of shape (..., n) in the kernels' type, with n filled up to whole packets."""
