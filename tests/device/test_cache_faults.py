@@ -13,8 +13,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -24,12 +25,21 @@ from clfractal.device.select import Device, choose, is_pocl
 from clfractal.engine import thumbnails
 from clfractal.errors import CacheWarning, DeviceError, FileError, UntriedError
 from clfractal.integrators import lanes
+from clfractal.integrators.trial import RULES
 from tests.calls import raising
 from tests.interrupts import planes
 from tests.shell import SCENE, Ended, command, environment, process, works
 
 SECTIONS = ("lanes", "marches", "speeds")
 """What is measured of a device; a first picture waits for the first of them alone."""
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _lanes_are_tried() -> Iterator[None]:
+    """As users' are: no lane count is given."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv(lanes.LANES_VARIABLE, raising=False)
+        yield
 
 
 SMALL = SCENE.replace("camera:", "renderer: {type: cut_plane}\ncamera:")
@@ -45,16 +55,6 @@ def good(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.fixture(scope="module")
-def several(good: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The same of a scene that takes several programs."""
-    folder = tmp_path_factory.mktemp("several")
-    shutil.copytree(good / "cache", folder / "cache", ignore=shutil.ignore_patterns("programs"))
-    rendered(folder, SCENE)
-    assert len(list((folder / "cache" / "programs").iterdir())) >= 4
-    return folder
-
-
 def rendered(folder: Path, scene: str) -> None:
     """Renders a scene of a folder, with the cache in it."""
     (folder / "scene.yaml").write_text(scene)
@@ -64,10 +64,9 @@ def rendered(folder: Path, scene: str) -> None:
     assert list((folder / "cache" / "programs").iterdir())
 
 
-def measures(folder: Path) -> None:
-    """Measures all devices, with the cache in a folder."""
-    works(process(["devices"], folder, {"CLFRACTAL_CACHE": str(folder / "cache")}))
-    assert all((folder / "cache" / f"{section}.json").exists() for section in SECTIONS)
+def steady_job(request: Mapping[str, Any]) -> dict[str, Any]:
+    """In the place of the march of each lane count, whose times are worth keeping only while nothing else runs."""
+    return {"steady": True, **dict.fromkeys(RULES, [1.0] * len(request["lanes"]))}
 
 
 def again(good: Path, folder: Path) -> Ended:
@@ -112,37 +111,36 @@ def _empty(path: Path) -> None:
     os.truncate(path, 0)
 
 
-def test_damaged_programs(several: Path, tmp_path: Path) -> None:
-    shutil.copytree(several / "cache", tmp_path / "cache")
-    programs = tmp_path / "cache" / "programs"
-    names = sorted(path.name for path in programs.iterdir())
-    for name, damage in zip(names, [_flip, _cut, _empty] * len(names), strict=False):
-        damage(programs / name)
-    assert again(several, tmp_path).err == ""
-    assert is_whole(tmp_path / "cache", several)
-    assert len(list(programs.iterdir())) >= 3
+DAMAGES = {"a bit flipped": _flip, "cut short": _cut, "empty": _empty}
 
 
-def test_damaged_facts(good: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
+def test_damaged_programs(good: Path, tmp_path: Path, damage: Callable[[Path], None]) -> None:
+    shutil.copytree(good / "cache", tmp_path / "cache")
+    for path in (tmp_path / "cache" / "programs").iterdir():
+        damage(path)
+    assert again(good, tmp_path).err == ""
+    assert is_whole(tmp_path / "cache", good)
+
+
+def test_damaged_facts(good: Path, tmp_path: Path, device: Device, monkeypatch: pytest.MonkeyPatch) -> None:
     """A picture does without them, and what measures devices finds them again."""
     shutil.copytree(good / "cache", tmp_path / "cache")
-    for section, damage in zip(SECTIONS, (_flip, _cut, _empty), strict=True):
+    for section, damage in zip(SECTIONS, DAMAGES.values(), strict=True):
         fact = tmp_path / "cache" / f"{section}.json"
         shutil.copy(good / "cache" / "lanes.json", fact)
         damage(fact)
     assert again(good, tmp_path).err == ""
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(tmp_path / "cache"))
-    for _ in range(6):  # what is measured while other tests have the processor's cores is not kept
-        measures(tmp_path)
-        found = {section: set(cache.recall(section)) for section in SECTIONS}
-        if all(found.values()):
-            break
-    assert all(found.values()), "six measurements, and something else had the cores in each"
+    monkeypatch.setattr(lanes, "JOB", f"{__name__}:steady_job")
+    lanes.march_reports(device, "float32")
+    found = {section: set(cache.recall(section)) for section in SECTIONS}
+    assert all(found.values())
     monkeypatch.setenv(cache.ENVIRONMENT_VARIABLE, str(good / "cache"))
     assert found["lanes"] >= set(cache.recall("lanes")) > set()
 
 
-@pytest.mark.parametrize("damage", [_flip, _cut, _empty], ids=["a bit flipped", "cut short", "empty"])
+@pytest.mark.parametrize("damage", DAMAGES.values(), ids=DAMAGES)
 def test_damaged_small_pictures(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, damage: Callable[[Path], None]
 ) -> None:
