@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 from collections.abc import Callable
 from functools import lru_cache, partial
-from itertools import product
 from typing import Any
 
 import mpmath
@@ -382,7 +381,7 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
     check_usable(precision)
     unit = float(np.finfo(precision).eps)
     compared = 0
-    for parameters, as_any in product(({}, *values_of(name)), (False, True)):
+    for parameters in ({}, *values_of(name)):
         chain = catalog.load_chain(spec_of(name, parameters))
         at = points_of(chain)[:10]
         with np.errstate(all="ignore"):
@@ -392,14 +391,20 @@ def test_every_value_of_the_library(name: str, precision: Precision) -> None:
         width = np.broadcast_to(width.max(axis=1, keepdims=True), width.shape)
         scale = np.abs(expected).max(axis=1, keepdims=True)
         allowed = 8 * width + 64 * chain.first.degree * unit * scale
-        got = orbits(name, parameters, at, precision, as_any=as_any)
         radius = np.sqrt((expected[:, :, 0] ** 2).sum(axis=1))
         near = np.logical_and.accumulate(radius <= FAR, axis=0)[:, None, None]
         near = np.broadcast_to(near, expected.shape) & np.isfinite(allowed)
-        for rows in (got[:, :, 1:], got[:, :, [0, 2, 3, 4]]):
-            wrong = near & ~(np.abs(rows - expected) <= allowed)
-            assert not wrong.any(), (parameters, np.argwhere(wrong)[0], rows[wrong][0], expected[wrong][0])
-        compared += int(near.sum())
+        for as_any in (False, True):
+            got = orbits(name, parameters, at, precision, as_any=as_any)
+            for rows in (got[:, :, 1:], got[:, :, [0, 2, 3, 4]]):
+                wrong = near & ~(np.abs(rows - expected) <= allowed)
+                assert not wrong.any(), (
+                    parameters,
+                    np.argwhere(wrong)[0],
+                    rows[wrong][0],
+                    expected[wrong][0],
+                )
+            compared += int(near.sum())
     assert compared > 100
 
 
