@@ -34,11 +34,11 @@ def names_at_end(formula: Formula, node: Node) -> frozenset[str]:
 def _needed(chain: Chain) -> frozenset[str]:
     carried = frozenset(chain.carried)
     needed: frozenset[str] = frozenset()
-    if chain.shape_index is not None:
-        formula = chain.links[chain.shape_index].bound.formula
+    for index in chain.may_tell_solid(ruled=False):
+        formula = chain.links[index].bound.formula
         node = formula.distance if chain.rule_index is not None else formula.shape
         assert node is not None
-        needed = names_at_end(formula, node) & carried
+        needed |= names_at_end(formula, node) & carried
     while True:
         grown = needed
         for link in chain.links:

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,7 +15,7 @@ from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64
 MAX_COUNT = 1000
-# Applications until turns that are data repeat themselves.
+# Applications until turns that are data repeat themselves; those of longer ones are in the text.
 MAX_TABLE = 4096
 # An application that no orbit gets to.
 NEVER = 2**31 - 1
@@ -56,6 +56,7 @@ class Chain:
         source: a mapping (`name`, `inline` or `chain` with what goes with it) that `catalog.resolve` turns
         into an
             equal chain on any machine with this version of the library.
+        order: the links' numbers in the order of their turns; None: as they stand.
     """
 
     links: tuple[Link, ...]
@@ -65,6 +66,7 @@ class Chain:
     step_scale_override: float | None = None
     title: str = ""
     source: Mapping[str, Any] | None = None
+    order: tuple[int, ...] | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.links) <= MAX_LINKS:
@@ -77,16 +79,14 @@ class Chain:
                 raise FormulaError(f"count must be 1 to {MAX_COUNT}, got {link.count}", Where())
             if not 0 <= link.start <= MAX_START or (link.stop is not None and link.stop <= link.start):
                 raise FormulaError(f"start must be 0 to {MAX_START} and below stop", Where())
-        last = self.spans[-1]
-        if self.turns_are_data and last.begin + last.cycle > MAX_TABLE:
-            raise FormulaError(f"the turns must repeat themselves within {MAX_TABLE} applications", Where())
+        _ = self.spans  # refuses turns with a gap
 
     @cached_property
     def key(self) -> tuple[object, ...]:
         """All that a picture of the chain depends on."""
         links = tuple((link.bound.key, link.turns) for link in self.links)
         radii = (self.bailout_override, self.distance_bailout_override, self.step_scale_override)
-        return (links, self.bounds_override, radii)
+        return (links, self.order, self.bounds_override, radii)
 
     @cached_property
     def _hash(self) -> int:
@@ -105,7 +105,26 @@ class Chain:
     @cached_property
     def spans(self) -> tuple[Span, ...]:
         """The parts of an orbit in which the same links take part."""
-        return spans_of(self.links)
+        order = self.turn_order
+        found = spans_of([self.links[number] for number in order])
+        return tuple(replace(span, members=tuple(order[each] for each in span.members)) for span in found)
+
+    @property
+    def turn_order(self) -> Sequence[int]:
+        """The links' numbers in the order of their turns."""
+        return range(len(self.links)) if self.order is None else self.order
+
+    @cached_property
+    def as_written(self) -> Chain:
+        """The same chain with its links in an order that does not depend on their turns: that of its text."""
+        links = range(len(self.links))
+        if not self.turns_are_data:
+            return self
+        order = sorted(links, key=lambda number: self.links[number].bound.content)
+        if order == [*links]:
+            return self
+        turns = tuple(order.index(number) for number in self.turn_order)
+        return replace(self, links=tuple(self.links[number] for number in order), order=turns)
 
     @cached_property
     def first_index(self) -> int:
@@ -140,22 +159,34 @@ class Chain:
     @property
     def repeats_from(self) -> int:
         """The application from which on equal z have equal futures, with the period `cycle_length`; it may be `NEVER`."""
-        if self.turns_are_data or self.carried or any(link.bound.formula.numbered for link in self.links):
+        if self.carried or any(link.bound.formula.numbered for link in self.links):
             return NEVER
         return self.spans[-1].begin
 
     @cached_property
     def structure(self) -> tuple[object, ...]:
-        """What its text depends on beside values of parameters, and beside facts that follow from them."""
+        """What its text depends on beside values of parameters, and beside `facts`."""
         if not self.turns_are_data:
-            return tuple(link.structure for link in self.links)
+            return (self.order, *(link.structure for link in self.links))
         members = tuple((link.bound.formula, link.bound.add) for link in self.links)
         return (members, self.first_index, self.shape_index, self.rule_index)
 
     @property
+    def facts(self) -> tuple[object, ...]:
+        """What its text depends on that follows from values; where turns are data of all links: each may be the first."""
+        if not self.turns_are_data:
+            return (self.degree > 1, self.first.begins)
+        return tuple((link.bound.degree > 1, link.bound.begins) for link in self.links)
+
+    @property
     def starts_at_zero(self) -> bool:
         """Whether iteration starts at z = 0, because f(0) is not a finite number or depends on the point."""
-        return self.add == "point" and self.first.start is None
+        return self.first.begins == "zero"
+
+    @property
+    def starts_counted(self) -> bool:
+        """Whether iteration starts after the first application."""
+        return self.first.begins == "after"
 
     @property
     def period(self) -> int:
@@ -164,8 +195,8 @@ class Chain:
 
     @cached_property
     def turns_are_data(self) -> bool:
-        """Whether whose turn it is stands in no text: of chains with members that use the language's later words."""
-        return len(self.links) > 1 and any(link.bound.formula.grown for link in self.links)
+        """Whether whose turn it is stands in no text."""
+        return len(self.links) > 1 and self.spans[-1].begin + self.spans[-1].cycle <= MAX_TABLE
 
     @cached_property
     def carried(self) -> tuple[str, ...]:
@@ -173,14 +204,25 @@ class Chain:
         names = (each.name for link in self.links for each in link.bound.formula.state)
         return tuple(dict.fromkeys(names))
 
+    def starts_of(self, name: str) -> dict[int, Node]:
+        """What the links say that a carried number is before the first application."""
+        return {
+            index: each.start
+            for index, link in enumerate(self.links)
+            for each in link.bound.formula.state
+            if each.name == name
+        }
+
     def begins(self, name: str) -> tuple[int, Node]:
         """A carried number's value before the first application: the link that says it, and the expression."""
-        first = self.first_index
-        for index in (first, *range(len(self.links))):
-            for each in self.links[index].bound.formula.state:
-                if each.name == name:
-                    return index, each.start
-        raise KeyError(name)
+        starts = self.starts_of(name)
+        index = next(each for each in (self.first_index, *self.turn_order) if each in starts)
+        return index, starts[index]
+
+    def begun(self, name: str) -> int | None:
+        """The link that says what a carried number begins with; None: what the first application has made of it."""
+        own = any(each.name == name for each in self.first.formula.state)
+        return None if self.starts_counted and own else self.begins(name)[0]
 
     @cached_property
     def table(self) -> tuple[tuple[int, ...], int]:
@@ -200,10 +242,10 @@ class Chain:
     def _index_at(self, application: int) -> int:
         span = next(span for span in self.spans if span.end is None or application < span.end)
         place = span.place(application)
-        for index, link in enumerate(self.links):
-            if place < link.count:
+        for index in self.turn_order:
+            if place < self.links[index].count:
                 return index
-            place -= link.count
+            place -= self.links[index].count
         raise AssertionError("a place in the turns belongs to a link")
 
     @cached_property
@@ -228,6 +270,27 @@ class Chain:
         index = self.spans[-1].members[-1]
         has_shape = self.links[index].bound.formula.shape is not None
         return index if has_shape and self.degree <= 1 else None
+
+    @property
+    def has_solid(self) -> bool:
+        """Whether a shape, or a distance that the formulas tell themselves, is what rays march by."""
+        return self.rule_index is not None or self.shape_index is not None
+
+    def may_tell_solid(self, *, ruled: bool) -> tuple[int, ...]:
+        """The links whose shape, or own distance, may tell the last solid: where turns are data, whoever has the last one.
+
+        Args:
+            ruled: for rays that march by the formulas' own distances, which they do for any degree.
+        """
+        found = self.rule_index if ruled else self.shape_index
+        if not self.turns_are_data:
+            return () if found is None else (found,)
+        told = [self.rule_index is not None or link.bound.formula.shape is not None for link in self.links]
+        return tuple(
+            number
+            for number, link in enumerate(self.links)
+            if told[number] and (ruled or link.bound.degree <= 1)
+        )
 
     @cached_property
     def bailout(self) -> float:

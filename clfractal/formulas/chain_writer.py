@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from clfractal.formulas.carried import carried_over_duals
-from clfractal.formulas.chain import Chain, Link
+from clfractal.formulas.chain import Chain
+from clfractal.formulas.chain_ends import EndsWriter, Leaf, parameters_of
 from clfractal.formulas.costs import OPERATIONS, WORTH_CARRYING, cost_of, count_of_operations
 from clfractal.formulas.definition import BoundFormula, point_name
 from clfractal.formulas.emit import Constants, NumberType
@@ -17,7 +17,7 @@ from clfractal.formulas.functions import Facts, each_usual, function_text, link_
 from clfractal.formulas.fuse import fused, needed
 from clfractal.formulas.jacobian import LocalJacobian, local_jacobian
 from clfractal.formulas.names import APPLICATION
-from clfractal.formulas.nodes import Name, Number, names_in
+from clfractal.formulas.nodes import names_in
 from clfractal.formulas.products import Value, literal
 from clfractal.formulas.scopes import ScopedEmitter
 from clfractal.formulas.statements import BlockWriter
@@ -27,66 +27,36 @@ from clfractal.formulas.turns import turn_lines
 DualMap = Literal["operations", "jacobian", "cheapest"]
 
 
-@dataclass(frozen=True, slots=True)
-class Leaf:
-    """A formula among several: what its functions' names begin with, and of how many numbers the state of all is.
-
-    Attributes:
-        width: numbers of z.
-        carried: numbers that are carried beside it.
-    """
-
-    name: str
-    width: int
-    carried: int = 0
-
-
-class ChainWriter:
+class ChainWriter(EndsWriter):
     def __init__(self, chain: Chain, scalar_rule: bool, dual_map: DualMap, leaf: Leaf | None) -> None:
-        self.chain = chain
-        self.leaf = leaf
-        self.name = "" if leaf is None else leaf.name
+        super().__init__(chain, scalar_rule, leaf)
         self.dual_map = dual_map
-        self.links: Sequence[Link] = chain.links
-        self.size = chain.size
-        self.width = chain.size if leaf is None else leaf.width
-        self.constants = Constants()
-        # Rays march by a scalar rule, or by a distance of the formula's own.
-        self.rule_index = chain.rule_index if scalar_rule else None
         has_rule = all(link.bound.derivative is not None for link in self.links)
-        self.has_derivative = scalar_rule and (has_rule or self.rule_index is not None)
-        self.solid_index = chain.shape_index if self.rule_index is None else self.rule_index
+        self.has_derivative = scalar_rule and (has_rule or self.ruled)
         self.ways = [
             (index, way)
             for index in range(len(self.links))
             for way in (False, True)
             if self.shaped(index) >= way
         ]
-        self.starts_at_zero = chain.starts_at_zero
-        self.starts_at_first = chain.add == "point" and not self.starts_at_zero
-        self.carried = chain.carried
-        self.room = len(self.carried) if leaf is None else leaf.carried
-        over_duals = carried_over_duals(chain)
-        # Of each number beside z over dual numbers the type; several formulas have them all as dual numbers.
-        self.over_duals = {self.carried.index(name): c_type for name, c_type in over_duals.items()}
-        if leaf is not None:
-            self.over_duals = dict.fromkeys(range(self.room), "dual")
 
     def write(self) -> tuple[str, Facts, Constants]:
         """The text, what kernels know of it, and the places of what the host passes."""
         parts = [self._has_usual_values(), *self._of_type("real"), *self._of_type("dual")]
+        parts += filter(None, [self.carried_number()])
         if self.has_derivative:
             parts += (self._apply_derivative(index, usual=usual) for index, usual in self.ways)
             parts.append(self._dispatch("real", derivative=True))
         facts = Facts(
             self.width,
-            int(self.starts_at_first),
+            int(self.chain.starts_counted),
             self.chain.degree > 1,
             self.has_derivative,
-            self.solid_index is not None,
+            self.ruled or self.chain.shape_index is not None,
             any(map(_CALLS.search, parts)),
             len(self.links) == 1 and not self._numbered(0) and self._operations() >= WORTH_CARRYING,
             self.room,
+            self.by_record,
         )
         types = state_functions(self.width, self.room, self.over_duals)
         head = [facts.defines() + each_usual(1), types] if self.leaf is None else []
@@ -99,19 +69,19 @@ class ChainWriter:
     def _operations(self) -> int:
         """Of an application as rays march by it, of the first link."""
         usual = self.shaped(0)
-        if self.has_derivative and self.rule_index is None:
+        if self.has_derivative and not self.ruled:
             marched = self._apply_derivative(0, usual=usual)
         else:
-            marched = self._apply(0, "dual" if self.rule_index is None else "real", usual=usual)
+            marched = self._apply(0, "real" if self.ruled else "dual", usual=usual)
         return count_of_operations(marched, OPERATIONS)
 
     def _of_type(self, number_type: NumberType) -> list[str]:
         """The functions over one number type."""
         return [
-            self._start(number_type),
+            self.start(number_type),
             *(self._apply(index, number_type, usual=usual) for index, usual in self.ways),
             self._dispatch(number_type, derivative=False),
-            self._solid_distance(number_type),
+            self.solid_distance(number_type),
         ]
 
     def _has_usual_values(self) -> str:
@@ -125,7 +95,7 @@ class ChainWriter:
 
     # --- one link ---
 
-    def _emitter(
+    def emitter(
         self, index: int, number_type: NumberType, *, branches: bool = False, usual: bool = False
     ) -> ScopedEmitter:
         bound = self.links[index].bound
@@ -138,7 +108,7 @@ class ChainWriter:
         literals = {name: literal(value) for name, value in bound.formula.shaping.items() if usual}
         return ScopedEmitter(
             number_type,
-            bindings | _parameters(bound) | literals,
+            bindings | parameters_of(bound) | literals,
             self.constants,
             index,
             branches,
@@ -188,18 +158,10 @@ class ChainWriter:
             if value is None:
                 texts.append(f"z.e{place}")
             elif number_type == "dual" and self.over_duals[place] == "dual":
-                texts.append(self._full("dual", value))
+                texts.append(self.full("dual", value))
             else:
                 texts.append(value.text)
         return texts if places else []
-
-    def _full(self, number_type: NumberType, value: Value) -> str:
-        """A value as text of the full number type."""
-        return (
-            f"dual_constant({value.text})"
-            if number_type == "dual" and value.kind != "varying"
-            else value.text
-        )
 
     def _add_constant(
         self, index: int, number_type: NumberType, emitter: ScopedEmitter, mapped: list[Value]
@@ -210,16 +172,16 @@ class ChainWriter:
         for i, value in enumerate(mapped):
             added = Value(f"c.s{i}", "varying")
             if bound.add == "none":
-                texts.append(self._full(number_type, value))
+                texts.append(self.full(number_type, value))
             elif bound.add == "constant":
                 assert bound.julia is not None
                 added = Value(self.constants.text((index, "julia", i)), "flat")
-                texts.append(self._full(number_type, emitter.combine("add", value, added)))
+                texts.append(self.full(number_type, emitter.combine("add", value, added)))
             elif number_type == "dual" and i < 3:
                 # The point's own coordinate has the partials 1, 0, 0: one addition instead of four.
-                texts.append(f"dual_add_coordinate_{'xyz'[i]}({self._full('dual', value)}, c.s{i}.v)")
+                texts.append(f"dual_add_coordinate_{'xyz'[i]}({self.full('dual', value)}, c.s{i}.v)")
             else:
-                texts.append(f"{number_type}_add({self._full(number_type, value)}, c.s{i})")
+                texts.append(f"{number_type}_add({self.full(number_type, value)}, c.s{i})")
             # The product of a last operation joins what is added, as it does within the map.
             call = fused("add", (value, added), emitter.origins, emitter.plain)
             if call is not None and bound.add == "point":
@@ -230,7 +192,7 @@ class ChainWriter:
     def _apply(self, index: int, number_type: NumberType, *, usual: bool) -> str:
         bound = self.links[index].bound
         state = "state" if number_type == "real" else "dual_state"
-        emitter = self._emitter(index, number_type, branches=number_type == "real", usual=usual)
+        emitter = self.emitter(index, number_type, branches=number_type == "real", usual=usual)
         found = self._map(emitter, bound, self._beside_z(number_type))
         mapped = found.values
         local, written = None, emitter.lines
@@ -246,7 +208,7 @@ class ChainWriter:
         passes = []
         times = self._times(index, usual=usual)
         if times != "1":
-            inner = ", ".join(local.rows() if local else (self._full(number_type, value) for value in mapped))
+            inner = ", ".join(local.rows() if local else (self.full(number_type, value) for value in mapped))
             passes = [
                 f"for (int pass = 1; pass < {times}; ++pass) {{",
                 *("    " + line for line in written),
@@ -289,7 +251,7 @@ class ChainWriter:
         return f"(int)k[{self.constants.slot((index, 'repeat', 0))}]"
 
     def _by_local_jacobian(self, index: int, *, usual: bool) -> LocalJacobian:
-        emitter = self._emitter(index, "real", usual=usual)
+        emitter = self.emitter(index, "real", usual=usual)
         emitter.bindings = {
             name: Value(f"{value.text}.v", value.kind) if value.text.startswith(("z.", "c.")) else value
             for name, value in emitter.bindings.items()
@@ -324,12 +286,12 @@ class ChainWriter:
         number, passed = (f"int {APPLICATION}, ", f"{APPLICATION}, ") if self._numbered(index) else ("", "")
         name = self.name + link_name("derivative", index, usual)
         head = f"INLINE state {name}({number}state z, state c, real *growth, __constant const scalar *k) {{"
-        if self.rule_index is not None:
+        if self.ruled:
             # The distance is in scene units: nothing is to be divided by.
             same = f"{self.name}{link_name('real', index, usual)}"
             return function_text(head, [], f"return {same}({passed}z, c, k);")
         assert bound.derivative is not None
-        emitter = self._emitter(index, "real", branches=True, usual=usual)
+        emitter = self.emitter(index, "real", branches=True, usual=usual)
         emitter.bindings["dr"] = Value("(*growth)", "varying")
         found = self._map(emitter, bound)
         growth = emitter.emit(bound.derivative)
@@ -338,22 +300,6 @@ class ChainWriter:
         )
         tail = f"const state next = {{{', '.join(texts)}}};\n    *growth = {growth.text};\n    return next;"
         return function_text(head, emitter.lines, tail)
-
-    def _solid_distance(self, number_type: NumberType) -> str:
-        """The shape's, or the formula's own distance; nobody asks for that of a formula without one."""
-        prefix, state = ("", "state") if number_type == "real" else ("dual_", "dual_state")
-        name = f"{self.name}{prefix}solid_distance"
-        head = f"INLINE {number_type} {name}({state} z, __constant const scalar *k) {{"
-        index = self.solid_index if number_type == "real" else self.chain.shape_index
-        if index is None:
-            return function_text(head, [], f"return {self._full(number_type, Value('R(0.0)', 'constant'))};")
-        formula = self.links[index].bound.formula
-        node = formula.shape if self.chain.rule_index is None else formula.distance
-        assert node is not None
-        emitter = self._emitter(index, number_type)
-        emitter.lets = dict(formula.let)
-        value = self._full(number_type, emitter.emit(node))
-        return function_text(head, emitter.lines, f"return {value};")
 
     # --- the chain ---
 
@@ -375,7 +321,10 @@ class ChainWriter:
             return f"return usual ? {usual} : {general};" if self.shaped(index) else f"return {general};"
 
         lines = []
+        order = self.chain.turn_order
+        last = order[-1]
         if self.chain.turns_are_data:
+            last = len(order) - 1
             first, early, again = (f"(int)k[{self.constants.slot((0, 'turns', part))}]" for part in range(3))
             lines.append(f"const int place = n < {early} ? n : {early} + (n - {early}) % {again};")
             lines.append(f"const int link = (int)k[{first} + place];")
@@ -383,82 +332,19 @@ class ChainWriter:
         elif len(self.links) > 1:
             lines += turn_lines(self.chain.spans)
             before = 0
-            for index, link in enumerate(self.links[:-1]):
-                before += link.count
+            for index in order[:-1]:
+                before += self.links[index].count
                 lines.append(f"if (turn < {before}) {call(index)}")
         arguments = f"int n, {state} z, {state} c{extra}, __constant const scalar *k"
         head = f"INLINE {state} {name}_by(int usual, {arguments}) {{"
         both = f"return {name}_by({self.name}has_usual_values(k), n, z, c{passed}, k);"
-        return function_text(head, lines, call(len(self.links) - 1)) + function_text(
+        return function_text(head, lines, call(last)) + function_text(
             f"INLINE {state} {name}({arguments}) {{", [both], None
         )
 
     def shaped(self, index: int) -> bool:
         """Whether a link has parameters whose usual values are literals."""
         return bool(self.links[index].bound.formula.shaping)
-
-    def _start(self, number_type: NumberType) -> str:
-        """The point as a state, and where the orbit begins.
-
-        With f(0) = 0 the first application gives C; dual numbers at 0 would give 0 times infinity in many formulas.
-        """
-        index, bound = self.chain.first_index, self.chain.first
-        names = ["point.x", "point.y", "point.z"]
-        state = "state" if number_type == "real" else "dual_state"
-        components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
-        bindings = {v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])}
-        emitter = ScopedEmitter(number_type, bindings | _parameters(bound), self.constants, index, prefix="p")
-        lines = [f"c->s{i} = {component};" for i, component in enumerate(components)]
-        if self.size == 4:
-            fourth = emitter.emit(bound.formula.slice or Number(0.0))
-            lines += [*emitter.lines, f"c->s3 = {self._full(number_type, fourth)};"]
-        zero = "R(0.0)" if number_type == "real" else "dual_constant(R(0.0))"
-        lines += [f"c->s{i} = {zero};" for i in range(self.size, self.width)]
-        if self.starts_at_zero:
-            lines += [f"z->s{i} = {zero};" for i in range(self.width)]
-        else:
-            lines.append("*z = *c;")
-            for i in range(self.size if self.starts_at_first else 0):
-                component = f"z->s{i}" if number_type == "real" else f"z->s{i}.v"
-                lines.append(f"{component} += {self.constants.text((index, 'start', i))};")
-        lines += self._start_beside(number_type)
-        name = "start" if number_type == "real" else "dual_start"
-        name = self.name + name
-        head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
-        return function_text(head, lines, None)
-
-    def _start_beside(self, number_type: NumberType) -> list[str]:
-        """The numbers beside z before the first application that is counted on."""
-        zero = "R(0.0)" if number_type == "real" else "dual_constant(R(0.0))"
-        places = range(self.room) if number_type == "real" else sorted(self.over_duals)
-        own = [each.name for each in self.chain.first.formula.state]
-        lines = [f"c->e{place} = {zero};" for place in places if not self._is_plain(number_type, place)]
-        lines += [f"c->e{place} = R(0.0);" for place in places if self._is_plain(number_type, place)]
-        for place in places:
-            name = self.carried[place] if place < len(self.carried) else None
-            value, text = Value("R(0.0)", "constant"), ""
-            if name is not None and self.starts_at_first and name in own:
-                number = (self.chain.first_index, "start", self.size + own.index(name))
-                value = Value(self.constants.text(number), "constant")
-            elif name is not None:
-                index, node = self.chain.begins(name)
-                bound = self.links[index].bound
-                bindings = {
-                    v: Value(f"c->s{i}", "varying") for i, v in enumerate(bound.formula.variables[:3])
-                }
-                prefix = f"b{place}_"
-                emitter = ScopedEmitter(
-                    number_type, bindings | _parameters(bound), self.constants, index, prefix=prefix
-                )
-                value = emitter.emit(node)
-                lines += emitter.lines
-            text = value.text if self._is_plain(number_type, place) else self._full(number_type, value)
-            lines.append(f"z->e{place} = {text};")
-        return lines
-
-    def _is_plain(self, number_type: NumberType, place: int) -> bool:
-        """Whether a number beside z has no partials."""
-        return number_type == "real" or self.over_duals[place] == "real"
 
 
 @dataclass(frozen=True, slots=True)
@@ -472,8 +358,3 @@ class _Mapped:
 
 # What drivers have in a library: calls that move all registers into memory.
 _CALLS = re.compile(r"\breal_(exp|log|pow|power_\w+|sin|cos|tan|asin|acos|atan2?|arc_slope)\(")
-
-
-def _parameters(bound: BoundFormula) -> dict[str, Value]:
-    """Parameters as names that `Emitter` turns into places of `k`."""
-    return {name: Value("", "constant", Name(name)) for name in bound.values}

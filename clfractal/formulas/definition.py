@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import struct
 from collections.abc import Callable, Mapping
@@ -20,6 +21,8 @@ from clfractal.formulas.nodes import Call, Node, Number, is_condition, names_in,
 _CHOOSING = MappingProxyType({"pow": 1, "cpow_re": 2, "cpow_im": 2, "where": 0})
 
 Add: TypeAlias = Literal["point", "constant", "none"]
+# Orbits begin at 0, at the point, or after the first application of a formula that adds it.
+Begins: TypeAlias = Literal["zero", "point", "after"]
 
 DEFAULT_DISTANCE_BAILOUT = 1000.0
 # |z| after one more application than needed may be distance_bailout**degree, its Jacobian that over the
@@ -201,6 +204,11 @@ class Formula:
         return {name: value for name, value in defaults.items() if name in found}
 
     @cached_property
+    def content(self) -> str:
+        """The mapping that it was read from, as text."""
+        return json.dumps(self.source, sort_keys=True, default=str)
+
+    @cached_property
     def _functions(self) -> dict[int, tuple[Node, Callable[[Mapping[str, float]], Any]]]:
         return {}
 
@@ -314,6 +322,18 @@ class BoundFormula:
     def has_usual_values(self) -> bool:
         """Whether parameters that choose between ways to compute have the values that the formula gives them."""
         return all(self.values[name] == value for name, value in self.formula.shaping.items())
+
+    @cached_property
+    def content(self) -> tuple[str, str]:
+        """What its text depends on beside values, as texts that are the same in every process."""
+        return self.formula.content, self.add
+
+    @property
+    def begins(self) -> Begins:
+        """Where an orbit begins whose first application is this formula's."""
+        if self.add != "point":
+            return "point"
+        return "zero" if self.start is None else "after"
 
     @cached_property
     def start(self) -> tuple[float, ...] | None:

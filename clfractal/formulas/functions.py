@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from clfractal.formulas.chain import Chain
 from clfractal.formulas.fuse import without_unused
 
 
@@ -22,6 +23,7 @@ class Facts:
         carries_orbits: whether a march leaves a packet's last orbits under way: where an application costs much beside a
             step, and is the same however many have been.
         carried: numbers that go on beside z.
+        by_record: which of these differ with a chain's turns: they are read from the orbit's record.
     """
 
     size: int
@@ -32,9 +34,20 @@ class Facts:
     has_calls: bool
     carries_orbits: bool
     carried: int = 0
+    by_record: frozenset[str] = frozenset()
+
+    def of(self, chain: Chain) -> Facts:
+        """The same of a chain with other turns, whose text this is too."""
+        if not self.by_record:
+            return self
+        shape = chain.shape_index is not None if "has_shape" in self.by_record else self.has_shape
+        return replace(
+            self, first_count=int(chain.starts_counted), logarithmic=chain.degree > 1, has_shape=shape
+        )
 
     def defines(self, **others: object) -> str:
         """As defines, of which some have other values."""
+        read = {name.upper(): f"(orbit->{name})" for name in sorted(self.by_record)}
         values: dict[str, object] = {
             "JOINED": 0,
             "STATE_SIZE": self.size,
@@ -47,7 +60,7 @@ class Facts:
         }
         if self.carried:
             values["STATE_CARRIED"] = self.carried
-        return "".join(f"#define {name} {value}\n" for name, value in {**values, **others}.items())
+        return "".join(f"#define {name} {value}\n" for name, value in {**values, **read, **others}.items())
 
 
 def each_usual(formulas: int) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import keyword
 import re
+import zlib
 from collections.abc import Collection, Mapping
 from typing import Any
 
@@ -15,6 +16,14 @@ APPLICATION = "n"
 
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,39}")
 _RESERVED = frozenset({*FUNCTIONS, "log2", "pi", "dr", "added", "julia"})
+
+
+def name_number(name: str) -> int:
+    """The number by which kernels know a name: positive, of 31 bits.
+
+    (A text in which two names had the same one would not compile.)
+    """
+    return zlib.crc32(name.encode()) % (2**31 - 1) + 1
 
 
 def check_keys(data: Mapping[str, Any], known: Collection[str], where: Where) -> None:

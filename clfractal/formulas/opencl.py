@@ -1,9 +1,9 @@
 """Writes a chain of formulas as OpenCL C over packets: the functions that `orbit.h` iterates.
 
-The text depends on the expressions, on counts, and on two facts that follow from values: whether the degree is above 1, and
-whether f(0) is a finite number. Everything else is in `constants`, the values of the kernel argument `k`. So a text is
-written once for all values of its parameters, and changing one needs no compilation. Where values choose between ways to
-compute, an application is written twice: for the usual values, which are literals then, and for any.
+The text depends on the expressions, and on two facts that follow from values: whether the degree is above 1, and whether
+f(0) is a finite number. Everything else is in `constants`, the values of the kernel argument `k`: parameters, and the turns
+of a chain. So a text is written once for all values of its parameters, and changing one needs no compilation. Where values
+choose between ways to compute, an application is written twice: for the usual values, which are literals then, and for any.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import Any
 
-from clfractal.formulas.chain_writer import ChainWriter, DualMap, Leaf
+from clfractal.formulas.chain_ends import Leaf, passed
+from clfractal.formulas.chain_writer import ChainWriter, DualMap
 from clfractal.formulas.costs import OPERATIONS, count_of_operations
 from clfractal.formulas.evaluate import as_function, finite
 from clfractal.formulas.functions import Facts, link_name
@@ -53,7 +54,8 @@ def write_formula(
 
     Writing takes milliseconds, so texts are kept: for other parameter values only the constants are computed.
     """
-    asked = _Asked((chain.structure, chain.degree > 1, chain.starts_at_zero), chain)
+    chain = chain.as_written
+    asked = _Asked((chain.structure, chain.facts), chain)
     return _written(asked, scalar_rule, dual_map, leaf).filled(chain)
 
 
@@ -90,14 +92,14 @@ class _Written:
         for owner, function, strict in self.owners:
             if function is None:
                 assert isinstance(owner, tuple)
-                constants.append(_passed(chain, *owner, behind=len(self.owners)))
+                constants.append(passed(chain, *owner, behind=len(self.owners)))
             else:
                 assert isinstance(owner, int)
                 value = function(chain.links[owner].bound.values)
                 constants.append(finite(value) if strict else float(value))
         if chain.turns_are_data:
             constants += map(float, chain.table[0])
-        return FormulaText(self.text, tuple(constants) or (0.0,), self.facts)
+        return FormulaText(self.text, tuple(constants) or (0.0,), self.facts.of(chain))
 
 
 @lru_cache(maxsize=512)
@@ -116,26 +118,12 @@ def _written(asked: _Asked, scalar_rule: bool, dual_map: DualMap, leaf: Leaf | N
     return _Written(_one(text), facts, tuple(owners))
 
 
-def _passed(chain: Chain, index: int, what: str, component: int, *, behind: int) -> float:
-    """A run-time constant that is no expression; `behind`: how many constants there are, behind which the turns stand."""
-    bound = chain.links[index].bound
-    if what == "usual":
-        return float(all(link.bound.has_usual_values for link in chain.links))
-    if what == "repeat":
-        return float(bound.repeat)
-    if what == "turns":
-        table, again = chain.table
-        return float((behind, len(table) - again, again)[component])
-    numbers = bound.julia if what == "julia" else bound.start
-    assert numbers is not None
-    return numbers[component]
-
-
 def operations_per_application(chain: Chain) -> float:
     """Arithmetic operations of one application as rays march by it, averaged over the chain's cycle.
 
     A fused multiply-add counts as two, a root or a division as one; comparisons and selections do not count.
     """
+    chain = chain.as_written
     formula = write_formula(chain)
     prefix = "derivative" if formula.has_derivative else "dual"
     prefix = prefix if chain.rule_index is None else "real"

@@ -23,6 +23,7 @@ _ASKED = (
     ("real", "solid_distance", "state z", ""),
     ("dual", "dual_solid_distance", "dual_state z", ""),
 )
+_ASKED_CARRIED = (("real", "carried_number", "int name, state z", ""),)
 _ASKED_DERIVATIVE = (
     ("state", "apply_derivative_by", "int usual, int n, state z, state c, real *growth", ""),
     ("state", "apply_derivative", "int n, state z, state c, real *growth", ""),
@@ -67,7 +68,11 @@ def write_together(chains: tuple[Chain, ...]) -> Together:
         constants.append(number)
         firsts.append(len(constants))
         constants += written.constants
-    asked = [*_ASKED, *_ASKED_DERIVATIVE] if scalar_rule else _ASKED
+    asked = [
+        *_ASKED,
+        *(_ASKED_CARRIED if carried else ()),
+        *(_ASKED_DERIVATIVE if scalar_rule else ()),
+    ]
     text = "\n".join(
         [
             _facts([leaf.facts for leaf in leaves]),
@@ -89,7 +94,7 @@ def _facts(each: list[Facts]) -> str:
     differing = {
         name.upper(): f"(orbit->{name})"
         for name in ("first_count", "logarithmic", "has_shape")
-        if len({getattr(facts, name) for facts in each}) > 1
+        if len({getattr(facts, name) for facts in each}) > 1 or any(name in facts.by_record for facts in each)
     }
     # (Orbits of several solids run neither side by side nor are they left under way: the last two are of no account.)
     return each[0].defines(JOINED=1, HAS_CALLS=1, CARRIES_ORBITS=0, **differing)

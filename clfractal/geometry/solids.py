@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -29,10 +28,6 @@ _BESIDE = 0.5
 # Where a surface is that flows into another the other is not farther off than this, in widths of the smooth union: it
 # is lifted by a quarter of the width at most, and distances that differ by more than the width do not flow.
 _FLOWS = 1.25
-
-# Applications between two looks at packets of voxels, at least; and between two looks for an orbit of a plane that came
-# back: few cost time, many find it late.
-_CHUNK, _PERIOD_CHECK = 4, 8
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,14 +89,11 @@ class Body:
         return (self.chain,) if self.scene is None else _chains(self.scene)
 
 
-def _turns(chains: Sequence[Chain]) -> dict[str, int]:
+def _turns(chains: Sequence[Chain]) -> dict[str, int | str]:
     """What texts that look for orbits that came back depend on: one set for all formulas of a program."""
-    cycle = math.lcm(*(chain.period for chain in chains))
-    return {
-        "CHUNK": cycle * -(-_CHUNK // cycle),
-        "PERIOD_CHECK": cycle * max(1, _PERIOD_CHECK // cycle),
-        "REPEATS_FROM": max(chain.repeats_from for chain in chains),
-    }
+    if any(len(chain.links) > 1 for chain in chains):
+        return {"CYCLE": "(orbit->cycle)", "REPEATS_FROM": "(orbit->repeats_from)"}
+    return {"CYCLE": 1, "REPEATS_FROM": max(chain.repeats_from for chain in chains)}
 
 
 def has_hollows(scene: Scene) -> bool:
@@ -131,8 +123,6 @@ def _joined_records(scene: Scene, precision: Precision) -> list[Record]:
         return {
             "kind": SOLID_KINDS["formula"],
             "first": first,
-            "first_count": written.facts.first_count,
-            "logarithmic": int(written.facts.logarithmic),
             "has_shape": int(written.facts.has_shape),
             "scale": scale * safe,
             "step_scale": safe,

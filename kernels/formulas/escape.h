@@ -1,7 +1,10 @@
 // Escape of points of a plane: exact counts without distances, and early detection of periodic orbits.
 //
-// From the build: PERIOD_CHECK, applications between two tests for a periodic orbit, a multiple of the chain's cycle;
-// REPEATS_FROM, the application from which on a chain's turns repeat themselves.
+// From the build: CYCLE, applications after which whose turn it is in a chain repeats itself; REPEATS_FROM, the one from which on it
+// does.
+
+// Applications between two tests for a periodic orbit, or as many whole cycles: few cost time, many find it late.
+#define PERIOD_CHECK 8
 
 // Whether two numbers have the same bits: unlike `equal`, this distinguishes +0 and -0.
 #define same_bits(a, b) equal_ints(as_whole(a), as_whole(b))
@@ -15,7 +18,7 @@ typedef struct {
 // The escape of points within `most` applications. `smooth` (0 or 1, best a constant): counts go on to the distance bailout and are smooth, with the inside
 // of the distances (packet_orbits.h); else they are whole, those of `formula_escape_count`.
 //
-// A point whose z has the very bits that it had some applications earlier (a multiple of the chain's cycle) repeats itself for
+// A point whose z has the very bits that it had some applications earlier (a multiple of CYCLE) repeats itself for
 // ever and never escapes. z is compared with one that is kept, and replaced by the present one at doubling intervals (Brent
 // 1980, An Improved Monte Carlo Factorization Algorithm, sec. 2): any cycle is found, of any length. Nothing but exact equality
 // will do: an orbit that comes near itself may still escape. `periodicity` 0 skips this test, for comparison.
@@ -31,14 +34,15 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
     mask inside = active & ~active;
     state kept = z;
     real highest = square;  // |z|^2 since then
-    int next_keep = FIRST_COUNT + PERIOD_CHECK;
+    const int check = CYCLE * max(1, PERIOD_CHECK / CYCLE);
+    int next_keep = FIRST_COUNT + check;
     // Equal states have equal futures only where the turns repeat.
-    int comparable = FIRST_COUNT >= REPEATS_FROM;
+    int kept_at = FIRST_COUNT, comparable = FIRST_COUNT >= REPEATS_FROM;
     int n = FIRST_COUNT, limit = most;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
         while (n < limit) {
             if (!any_lane(alive) || orbit_cancelled(orbit)) break;
-            const int end = min(n + PERIOD_CHECK, limit);
+            const int end = min(n + check, limit);
             for (; n < end; ++n) {
                 if (!any_lane(alive)) break;
                 const mask applied = going_on(alive);
@@ -55,12 +59,13 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
                 STATE_EACH(BACK)
                 // An orbit that comes and goes between the two radii is inside or not by the last application.
                 if (smooth) back &= less_equal(highest, (real)(orbit->bailout_square));
-                if (comparable) {
+                if (comparable && (n - kept_at) % CYCLE == 0) {
                     inside |= back;
                     alive &= ~back;
                 }
                 if (n >= next_keep) {
                     comparable = n >= REPEATS_FROM;
+                    kept_at = n;
                     kept = z;
                     highest = square;
                     next_keep = 2 * n;

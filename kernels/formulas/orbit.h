@@ -4,7 +4,8 @@
 // LOGARITHMIC (the degree is above 1), HAS_DERIVATIVE, HAS_SHAPE, HAS_CALLS (of exp, sin and their like), start, dual_start, apply,
 // apply_derivative and dual_apply (each also as ..._by), has_usual_values and its answers beside 0 (EACH_USUAL), state_pick,
 // dual_state_pick, state_square, solid_distance.
-// Of several formulas they are of the one whose constants are given, and what these do not have in common is read from its `orbit`.
+// Of several formulas they are of the one whose constants are given, and what these do not have in common is read from its `orbit`; so is
+// what differs between the links of a chain, each of which may be the first one and the last.
 //
 // A lane's orbit runs until |z| exceeds the distance bailout. The solid is the set of points with |z| <= bailout after
 // `iterations` applications; a lane that left the bailout by then but not yet the larger radius goes on a little longer.

@@ -1,7 +1,10 @@
 // Which points belong to a formula's solid, for many points at once.
 //
-// From the build: CHUNK, applications between two looks at a packet, a multiple of the chain's cycle; REPEATS_FROM, the
-// application from which on a chain's turns repeat themselves.
+// From the build: CYCLE, applications after which whose turn it is in a chain repeats itself; REPEATS_FROM, the one from which on it
+// does.
+
+// Applications between two looks at a packet: few cost time.
+#define CHUNK 4
 
 // Packets whose orbits are computed side by side, so that one goes on while another waits for a result. Where there is one
 // lane, the device has other work-items for that.
@@ -29,7 +32,8 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
     real square = state_square(z);
     mask alive = less_equal(square, farthest);
     int look = FIRST_COUNT + CHUNK, looks = 0, renewed = 1;
-    int comparable = FIRST_COUNT >= REPEATS_FROM;  // equal states have equal futures only where the turns repeat
+    // Equal states have equal futures only where the turns repeat.
+    int kept = FIRST_COUNT, comparable = FIRST_COUNT >= REPEATS_FROM;
     for (int n = FIRST_COUNT; n < limit && alive; ++n) {
         z = apply(n, z, c, k);
         square = state_square(z);
@@ -38,11 +42,12 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         look += CHUNK;
         if ((++looks & 1023) == 0 && orbit_cancelled(orbit)) break;
         if (!LOGARITHMIC) continue;
-        if (comparable && equal(apart_square(z, past), R(0.0)) && in_set(square, orbit)) break;
+        if (comparable && (n + 1 - kept) % CYCLE == 0 && equal(apart_square(z, past), R(0.0)) && in_set(square, orbit)) break;
         if (looks == renewed) {
             past = z;
             renewed *= 2;
-            comparable = n + 1 >= REPEATS_FROM;
+            kept = n + 1;
+            comparable = kept >= REPEATS_FROM;
         }
     }
     inside[0] = alive & in_set(square, orbit);
@@ -66,7 +71,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         open |= alive[p];
     }
     int n = FIRST_COUNT, renewed = 1, chunks = 0;
-    int comparable = FIRST_COUNT >= REPEATS_FROM;  // as above
+    int kept = n, comparable = n >= REPEATS_FROM;  // as above
     while (n + CHUNK <= limit && any_lane(open)) {
         if ((chunks & 1023) == 1023 && orbit_cancelled(orbit)) return;
         #pragma unroll
@@ -83,13 +88,14 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         ++chunks;
         #pragma unroll
         for (int p = 0; p < TURNS(PACKETS); ++p) {
-            if (LOGARITHMIC && comparable) {
+            if (LOGARITHMIC && comparable && (n - kept) % CYCLE == 0) {
                 periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & in_set(square[p], orbit);
             }
             if (LOGARITHMIC && chunks == renewed) past[p] = z[p];
             open |= alive[p] & ~periodic[p];
         }
         if (chunks == renewed) {
+            kept = n;
             comparable = n >= REPEATS_FROM;
             renewed *= 2;
         }
