@@ -1,4 +1,4 @@
-"""How settings choose colours: a palette, along which the orbit's least distance from the origin leads."""
+"""How settings choose colours: a palette, along which the orbit's least distance from the origin leads, or its folds."""
 
 from __future__ import annotations
 
@@ -15,8 +15,12 @@ _WHOLE = 2560
 """Of their units of colour a palette's length is so many."""
 _UNITS = {10: 1000, 73: 200}
 """How many units a distance of 1 is, by the formula; 5000 for all others, 1000 for hybrids."""
+_FOLD = 100
+"""How many units 1 of what folds sum up is."""
+_ALGORITHM = "mat1_fractal_coloring_algorithm"
+_EXTRA = "mat1_fractal_coloring_extra_color_enabled_false"
 _BY_FOLDS = (8, 17, 18, 43, 60, 64, 75, 76, 77)
-"""Formulas whose colours follow how often a point was folded, which ours do not count."""
+"""Formulas whose colours follow how often a point was folded, which those of our library do not count."""
 DEFAULT = (
     "0 fd6029 1000 698403 2000 fff59b 3000 f5bd22 4000 0b5e87"
     " 5000 c68876 6000 a51c64 7000 3b9fee 8000 d4ffd4 9000 aba53c"
@@ -24,8 +28,20 @@ DEFAULT = (
 """The colours of a file that gives none."""
 
 
-def coloring_of(settings: Settings, remarks: list[str]) -> dict[str, Any] | None:
+def follows_folds(settings: Settings) -> bool:
+    """Whether colours follow nothing but how often a point was folded."""
+    main = settings.main
+    plain = not any(main.flag(key, False) for key in ("hybrid_fractal_enable", "boolean_operators", _EXTRA))
+    shown = main.flag("mat1_use_colors_from_palette", True) and main.flag("fractal_color", True)
+    standard = main.text(_ALGORITHM, "0").strip() == "0"
+    return plain and shown and standard and main.whole("formula_1", 2) in _BY_FOLDS
+
+
+def coloring_of(settings: Settings, remarks: list[str], folds: str | None = None) -> dict[str, Any] | None:
     """The section `coloring`; None if the surface has one colour.
+
+    Args:
+        folds: the number that the formula carries of how often a point was folded; None: it has none.
 
     Raises:
         FileError: a value is none of its kind.
@@ -43,15 +59,15 @@ def coloring_of(settings: Settings, remarks: list[str]) -> dict[str, Any] | None
     hybrid = main.flag("hybrid_fractal_enable", False)
     number = main.whole("formula_1", 2)
     units = 1000 if hybrid else _UNITS.get(number, 5000)
-    if number in _BY_FOLDS or hybrid:
+    if (number in _BY_FOLDS and folds is None) or hybrid:
         remarks.append("colours follow the orbit's distance from 0 alone, not the folds that it went through")
-    if main.whole("mat1_fractal_coloring_algorithm", 0) != 0 or main.flag(
-        "mat1_fractal_coloring_extra_color_enabled_false", False
-    ):
+    if main.whole(_ALGORITHM, 0) != 0 or main.flag(_EXTRA, False):
         remarks.append("mat1_fractal_coloring_algorithm: colours follow the orbit's distance from 0")
     main.without(main.beginning("mat1_fractal_coloring_"))
+    by = {"by": "trap"} if folds is None else {"by": "carried", "number": folds}
+    units = units if folds is None else _FOLD
     return {
-        "by": "trap",
+        **by,
         "palette": stops,
         "scale": float(f"{units / _WHOLE * speed:.6g}"),
         "offset": offset % 1.0,

@@ -76,6 +76,9 @@ OTHERS: Mapping[str, Default] = {
     **dict.fromkeys(("IFS_offset", *(f"IFS_direction_{number}" for number in range(9))), (1.0, 0.0, 0.0)),
     **dict.fromkeys((f"IFS_{name}_{number}" for name in ("distance", "enabled") for number in range(9)), 0.0),
     **dict.fromkeys((f"IFS_intensity_{number}" for number in range(9)), 1.0),
+    **dict.fromkeys(("mandelbox_color", "mandelbox_color_4D"), (0.03, 0.05, 0.07)),
+    **dict.fromkeys(("mandelbox_color_Sp1", "mandelbox_color_Sp2"), 0.2),
+    "mandelbox_color_R": 0.0,
     "power": 9.0,
     "cadd": -1.3,
     "boxfold_bulbpow2_z_factor": 5.0,
@@ -95,7 +98,7 @@ OTHERS: Mapping[str, Default] = {
     "transf_power_8": (8.0,) * 3,
     "transf_scaleP_222": (0.2,) * 3,
 }
-_CHOICES = ("_order_of_", "combo", "mandelbulbMulti_", "sinTan2Trig_", "mandelbox_generalized")
+CHOICES = ("_order_of_", "combo", "mandelbulbMulti_", "sinTan2Trig_", "mandelbox_generalized")
 """What begins with the first of several ways."""
 _ZEROS = (
     "rotation",
@@ -126,7 +129,7 @@ def default_of(key: str) -> Default:
     if key in OTHERS:
         return OTHERS[key]
     last = key.rpartition("_")[2]
-    if any(name in key for name in _CHOICES):
+    if any(name in key for name in CHOICES):
         return 0.0
     if last == "false":
         return 0.0

@@ -16,6 +16,8 @@ from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around,
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
 from clfractal.exchange.solids import solids_of
+from clfractal.exchange.translate import carried_name
+from clfractal.exchange.translated import COLOR
 from clfractal.exchange.view import is_mirrored, view_of
 from clfractal.files.fragments import block_lines
 
@@ -166,7 +168,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
         mirror(scene)
     _hollow_out(scene, settings, installed)
     _leave_out_lamps(scene, remarks)
-    coloring = coloring_of(settings, remarks)
+    coloring = coloring_of(settings, remarks, _folds_of(scene["formula"]))
     if coloring is not None:
         scene["coloring"] = coloring
     _without_unused(settings.main)
@@ -193,6 +195,15 @@ def _without_unused(main: Section) -> None:
         main.without(
             key for key in main.beginning("mat") if key[3:4] in "23456789" and key[4:5] in "_0123456789"
         )
+
+
+def _folds_of(section: dict[str, Any]) -> str | None:
+    """The number of a scene's formula that says how a point was folded; None if there is none, or nothing changes it."""
+    inline = section.get("inline", {})
+    members = [each["inline"] for each in inline.get("chain", [section]) if "inline" in each]
+    name = carried_name(COLOR)
+    changed = any(each.get("state", {}).get(name, {"next": name})["next"] != name for each in members)
+    return name if changed else None
 
 
 _SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")

@@ -18,7 +18,8 @@ Found = float | Vector | Matrix | tuple[Vector, ...]
 IGNORED = ("mandelbox.color",)
 """What chooses colours alone."""
 _OFF = "foldColor."
-"""Whether colours are counted: as if they were not."""
+"""Whether colours are counted: as if they were not, where nobody asks for them."""
+_BOX_COLORS = {"factor": "", "factorR": "_R", "factorSp1": "_Sp1", "factorSp2": "_Sp2", "factor4D": "_4D"}
 _LOOSE_OTHERS = {folded(key).lower(): key for key in OTHERS}
 _RADII = ("mandelbox_folding_fixed_radius", "mandelbox_folding_min_radius")
 
@@ -28,10 +29,14 @@ class UnknownFieldError(Exception):
 
 
 class Parameters:
-    """The fields of a formula's parameters, with the values of a section and the defaults of what it leaves out."""
+    """The fields of a formula's parameters, with the values of a section and the defaults of what it leaves out.
 
-    def __init__(self, section: Section, choices: Mapping[str, int]) -> None:
-        self.section, self.choices = section, choices
+    Args:
+        colors: whether those of colours count.
+    """
+
+    def __init__(self, section: Section, choices: Mapping[str, int], *, colors: bool = False) -> None:
+        self.section, self.choices, self.colors = section, choices, colors
 
     def value(self, path: str, indices: Sequence[int] = ()) -> Found:
         """A field, such as `transformCommon.scale3`; of an array with its indices.
@@ -43,7 +48,7 @@ class Parameters:
             FileError: its value is none of its kind.
         """
         group, _, name = path.partition(".")
-        if path.startswith(_OFF):
+        if path.startswith(_OFF) and not self.colors:
             return 0.0
         if group == "IFS":
             found = self._of_ifs(name, indices)
@@ -144,6 +149,9 @@ class Parameters:
             return outer / inner if inner else 0.0
         if name == "mainRot":
             return rotation(self.read("mandelbox_rotation_main"))
+        color = _BOX_COLORS.get(name.removeprefix("color.")) if name.startswith("color.") else None
+        if color is not None:
+            return self.read(f"mandelbox_color{color}")
         if name in ("rot", "rotinv") and len(indices) == 2:
             found = rotation(self.read(f"mandelbox_rotation_{('neg', 'pos')[indices[0]]}_{indices[1] + 1}"))
             return found if name == "rot" else transposed(found)

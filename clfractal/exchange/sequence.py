@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from clfractal.errors import FileError
+from clfractal.exchange.colors import follows_folds
 from clfractal.exchange.counterparts import counterpart
 from clfractal.exchange.ends import (
     BAILOUT,
@@ -32,8 +33,8 @@ from clfractal.exchange.plan import (
     used_slots,
 )
 from clfractal.exchange.settings import SLOTS, Settings
-from clfractal.exchange.translate import NO_FOLDS, KeepsError, Space
-from clfractal.exchange.translated import STAYS, Following, NeedsFourError, Text, text_of
+from clfractal.exchange.translate import NO_FOLDS, Space
+from clfractal.exchange.translated import STAYS, Following, Text, followed_as_needed, text_of
 
 MOST_LINKS = 63
 FOLLOWED = 260
@@ -186,27 +187,23 @@ def _all_followed(
 ) -> tuple[list[dict[str, Any]], Following]:
     """The formula of each application: of three numbers, if that is enough, and with what has to be carried."""
     first = texts[slots[0].slot].parameters
-    four = plan.w != 0
     last = _last(plan, slots, texts)
     stands_still = last is not None and any(slot.number in DISCS for slot in slots)
     bailout = _bailout(plan) if stands_still else None
     if last is not None or plan.hollow is not None:
         carried = (*carried, *(() if "DE" in carried else ("DE",)))
-    while True:
-        if plan.hollow is not None:
-            last = distance_to_middle(4 if four else 3, powers=plan.hollow)
-        following = Following(
-            Space(four, plan.mirrored, plan.repeats), first, carried, shift, plan.folds, last, bailout
-        )
-        try:
-            return _followed(plan, slots, texts, order, following), following
-        except NeedsFourError:
-            four = True
-        except KeepsError as error:
-            if error.name in carried:
-                raise
-            # Distances to shapes are divided by how much space was enlarged.
-            carried = (*carried, *((error.name, "DE") if error.name == "dist" else (error.name,)))
+
+    def begin(four: bool, carried: tuple[str, ...]) -> Following:
+        own = last if plan.hollow is None else distance_to_middle(4 if four else 3, powers=plan.hollow)
+        space = Space(four, plan.mirrored, plan.repeats)
+        return Following(space, first, carried, shift, plan.folds, own, bailout)
+
+    return followed_as_needed(
+        begin,
+        lambda following: _followed(plan, slots, texts, order, following),
+        four=plan.w != 0,
+        carried=carried,
+    )
 
 
 def _bailout(plan: Plan) -> float:
@@ -242,7 +239,7 @@ def _later(link: dict[str, Any]) -> dict[str, int]:
 def _text(plan: Plan, slot: Slot) -> Text:
     fractal = plan.settings.fractal(slot.slot)
     where = plan.settings.main.where(f"formula_{slot.slot}")
-    found = text_of(slot.number, fractal, plan.installed)
+    found = text_of(slot.number, fractal, plan.installed, colors=follows_folds(plan.settings))
     if found is not None and slot.weight == 0:  # its turn leaves z where it is
         found.statements = STAYS
     if found is None:

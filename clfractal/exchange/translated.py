@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.c_text import Expression, Statement
@@ -19,6 +19,7 @@ from clfractal.exchange.translate import (
     VARIABLES,
     Applied,
     Folds,
+    KeepsError,
     Space,
     State,
     apply,
@@ -28,6 +29,9 @@ from clfractal.exchange.translate import (
 from clfractal.formulas.build_blocks import MAX_STATEMENTS
 from clfractal.formulas.build_orbit import MAX_LETS
 
+_Found = TypeVar("_Found")
+COLOR = "color"
+"""The field that sums up how a point was folded."""
 _TITLE = 60
 _STEP_SCALE = 0.7
 """Of distances that are a little too large."""
@@ -52,20 +56,23 @@ class Addition:
 
 @dataclass
 class Text:
-    """A formula's text, and the parameters that it is followed with."""
+    """A formula's text, and the parameters that it is followed with; `colors`: also for what colours follow."""
 
     number: int
     statements: tuple[Statement, ...]
     file: Path
     fractal: Section
     choices: Mapping[str, int]
+    colors: bool = False
     parameters: Parameters = field(init=False)
 
     def __post_init__(self) -> None:
-        self.parameters = Parameters(self.fractal, self.choices)
+        self.parameters = Parameters(self.fractal, self.choices, colors=self.colors)
 
 
-def text_of(number: int, fractal: Section, installed: Installed | None) -> Text | None:
+def text_of(
+    number: int, fractal: Section, installed: Installed | None, *, colors: bool = False
+) -> Text | None:
     """The text of a formula; None if it is not there.
 
     Raises:
@@ -74,7 +81,7 @@ def text_of(number: int, fractal: Section, installed: Installed | None) -> Text 
     found = None if installed is None else installed.text(number)
     if found is None or installed is None:
         return None
-    return Text(number, *found, fractal, installed.choices)
+    return Text(number, *found, fractal, installed.choices, colors)
 
 
 @dataclass
@@ -163,7 +170,7 @@ class Following:
         """The keys of a formula for what is carried, by the values after an application; it stays where there is none."""
         if not self.carried:
             return {}
-        begin = {"DE": 1.0, **first_state(self.symbols, self.first, self.space).scalars}
+        begin = {"DE": 1.0, COLOR: 1.0, **first_state(self.symbols, self.first, self.space).scalars}
         state = {
             carried_name(name): {"start": begin[name], "next": following.get(name, carried_name(name))}
             for name in self.carried
@@ -238,6 +245,35 @@ def with_room(formula: dict[str, Any]) -> dict[str, Any]:
     if state:
         found["state"] = {name: {"start": each["start"]} for name, each in state.items()}
     return {**found, "do": [*({name: part} for name, part in let.items()), after]}
+
+
+def followed_as_needed(
+    begin: Callable[[bool, tuple[str, ...]], Following],
+    follow: Callable[[Following], _Found],
+    *,
+    four: bool = False,
+    carried: tuple[str, ...] = (),
+) -> tuple[_Found, Following]:
+    """What `follow` finds, with three numbers of z where they are enough, and with the fields that have to be carried.
+
+    Args:
+        begin: makes a `Following`, of whether z has four numbers, and the fields that are carried.
+        four, carried: to begin with.
+
+    Raises:
+        FileError: the text does something that our language has not.
+    """
+    while True:
+        following = begin(four, carried)
+        try:
+            return follow(following), following
+        except NeedsFourError:
+            four = True
+        except KeepsError as error:
+            if error.name in carried:
+                raise
+            # Distances to shapes are divided by how much space was enlarged.
+            carried = (*carried, *((error.name, "DE") if error.name == "dist" else (error.name,)))
 
 
 def _formula(text: Text, let: Mapping[str, str], maps: Sequence[str], adds: bool) -> dict[str, Any]:

@@ -105,7 +105,7 @@ class Values(Arithmetic):
 
     def parameter(self, path: str, indices: list[int], expression: Expression) -> object:
         """A parameter's value, or a component of it."""
-        if path.startswith(IGNORED):
+        if path.startswith(IGNORED) and not self.parameters.colors:
             return NOTHING
         last = path.rpartition(".")[2]
         name, part = (

@@ -12,6 +12,7 @@ from clfractal.camera.views import View
 from clfractal.device.orbit import Record
 from clfractal.device.orbit import orbit_record as orbit_record
 from clfractal.device.structs import Field, Precision, Struct
+from clfractal.formulas.names import name_number
 from clfractal.geometry.objects import mirrors
 from clfractal.integrators.plan import Plan
 from clfractal.scene.coloring import Coloring
@@ -73,6 +74,7 @@ MATERIAL = Struct(
         Field("coloring_limit", "real", 0, "longest way, scene units"),
         Field("coloring_tests", "int", 0, "most inside tests for one end of a way"),
         Field("layer", "int", 0, "iterations of the other layer"),
+        Field("carried", "int", 0, "the number of the name of what the formula carries; 0: none"),
         Field("trap_center", "real", 3, "a point of the trap, in z"),
         Field("trap_direction", "real", 3, "its axis' or normal's direction, length 1"),
         Field("trap_radius", "real", 0, "a sphere's radius, in z"),
@@ -239,6 +241,13 @@ def _glow(scene: Scene) -> dict[str, object]:
     }
 
 
+def _carried(scene: Scene, coloring: Coloring | Map) -> int:
+    """The number of the name of what is carried; without a name of the first that the formulas carry."""
+    if coloring.by != "carried":
+        return 0
+    return name_number(coloring.number or next(iter(scene.carried)))
+
+
 def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
     """The fields of a Material for `kernels/shading/coloring.h`."""
     radius = scene.bounds[1]
@@ -256,6 +265,7 @@ def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
         "coloring_limit": 2 * radius,
         "coloring_tests": math.ceil(2 * radius / step) + EXTRA_TESTS,
         "layer": coloring.layer,
+        "carried": _carried(scene, coloring),
         "trap_center": coloring.trap.center,
         "trap_direction": direction / np.linalg.norm(direction),
         "trap_radius": coloring.trap.radius,

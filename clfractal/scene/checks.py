@@ -6,7 +6,7 @@ from operator import and_, gt, or_
 from typing import TYPE_CHECKING
 
 from clfractal.elements.lights.set import SetLight
-from clfractal.errors import SceneError, Where
+from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files.channels import (
     CRYPTOMATTE_MATERIALS,
     CRYPTOMATTE_OBJECTS,
@@ -16,6 +16,7 @@ from clfractal.files.channels import (
     SURFACE_LAYERS,
 )
 from clfractal.scene.alone import check_alone
+from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import MAX_ASKED
@@ -27,6 +28,7 @@ from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import Box, VolumeRenderer
 from clfractal.schema.base import Vector
 from clfractal.schema.light import SingleLight
+from clfractal.schema.mapped import Map, maps_of
 from clfractal.schema.quantity import colorings
 from clfractal.schema.shape import Simple
 
@@ -94,6 +96,22 @@ def _check_steps(scene: Scene) -> None:
     if isinstance(scene.renderer, SurfaceRenderer):
         _check_step(scene.renderer.step, radius, "renderer.step")
         _check_residual(scene, scene.renderer)
+
+
+def _check_carried(scene: Scene) -> None:
+    """What colours follow of what formulas carry has to be there."""
+    asking: list[tuple[str, Coloring | Map]] = [("coloring", scene.coloring)]
+    for name, material in scene.materials.items():
+        asking += ((f"materials.{name}.{key}", each) for key, each in maps_of(material))
+    for path, each in asking:
+        if each.by != "carried":
+            continue
+        known = scene.carried
+        if not known:
+            message = "carried needs a formula with numbers that are carried, and the scene's have no `state`"
+            raise SceneError(message, Where(path=f"{path}.by"))
+        if each.number is not None and each.number not in known:
+            raise SceneError(unknown_name("carried number", each.number, known), Where(path=f"{path}.number"))
 
 
 def _check_glow(scene: Scene) -> None:
@@ -382,6 +400,7 @@ def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -
 _PARTS = (
     check_alone,
     _check_steps,
+    _check_carried,
     _check_volume,
     _check_planes,
     _check_glow,

@@ -7,7 +7,7 @@ from pydantic import Field
 from clfractal.schema.base import Coordinate, Length, problem, rule
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
-from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
+from clfractal.schema.quantity import ByQuantity, CarriedName, ColoringKind, coloring_kind
 from clfractal.schema.stops import Palette
 from clfractal.schema.trap import Trap
 
@@ -37,6 +37,9 @@ class Coloring(ByQuantity):
     )
     step: Length | None = Field(
         None, description="step in that direction, scene units; null: 1/100 of the bounds' radius"
+    )
+    number: CarriedName | None = Field(
+        None, description="the name of the number for `by: carried`; null: the formula's first one"
     )
     trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape for `by: trap`")
 

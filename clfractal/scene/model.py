@@ -337,6 +337,12 @@ class Scene(Section):
         )
 
     @property
+    def carried(self) -> tuple[str, ...]:
+        """The names of all numbers that the scene's formulas carry."""
+        chains = (self.chain, *self.joined_chains.values())
+        return tuple(dict.fromkeys(name for chain in chains for name in chain.carried))
+
+    @property
     def joined_chains(self) -> "Mapping[str, Chain]":
         """The formulas of objects, by the objects' names.
 

@@ -23,7 +23,7 @@ from clfractal.schema.base import (
 )
 from clfractal.schema.fields import Usual
 from clfractal.schema.kinds import OneOf
-from clfractal.schema.quantity import ByQuantity, ColoringKind, coloring_kind
+from clfractal.schema.quantity import ByQuantity, CarriedName, ColoringKind, coloring_kind
 from clfractal.schema.stops import Palette, in_order
 from clfractal.schema.trap import Trap
 
@@ -57,6 +57,9 @@ class Map(ByQuantity):
     step: Length | None = Field(
         None,
         description="for `curvature`, `thickness`, `layer_distance`, scene units; null: 1/100 of the bounds' radius",
+    )
+    number: CarriedName | None = Field(
+        None, description="the name of the number for `by: carried`; null: the formula's first one"
     )
     trap: Trap = Field(default_factory=dict, validate_default=True, description="the shape for `by: trap`")
     scale: Annotated[Length, Usual(0.01, 10)] = Field(1.0, description="width of the texture, scene units")

@@ -1,8 +1,8 @@
 """What the colours of a surface, and values of its materials, may follow."""
 
-from typing import Any, ClassVar, Literal, TypeAlias, cast
+from typing import Annotated, Any, ClassVar, Literal, TypeAlias, cast
 
-from pydantic import GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler
 from pydantic_core import CoreSchema
 
 from clfractal.schema.base import Section
@@ -11,6 +11,9 @@ from clfractal.schema.kinds import Kind, OneOf, by_word, members
 
 Known: TypeAlias = Literal["at_hit", "with_points", "by_formula"]
 """When it is known of a place: with the ray's hit, once all of a pixel's points are, or after the formula is asked."""
+
+CarriedName = Annotated[str, Field(strict=True, min_length=1, max_length=60)]
+"""Of a number that a formula carries."""
 
 
 class ColoringKind(Kind):

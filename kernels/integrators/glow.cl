@@ -1,7 +1,7 @@
 // Entry point that knows the formula: the glow around the set that each ray of a path goes through.
 #include "formulas/orbits.h"
 #include "integrators/stages.h"
-#include "formulas/trap_near.h"
+#include "formulas/orbit_told.h"
 #include "shading/fog.h"
 
 // Light around the set. Each place of a ray adds exp(-d / width) / width for each unit of its way, d the distance to the set; by a

@@ -6,7 +6,7 @@
 // trap's in those of z.
 
 #include "shading/ways.h"
-#include "formulas/trap_near.h"
+#include "formulas/orbit_told.h"
 #include "elements/colorings"
 #include "elements/colorings/answers"
 

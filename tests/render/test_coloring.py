@@ -19,10 +19,18 @@ from clfractal.integrators.lanes import best_lanes
 from clfractal.scene.model import Scene
 from clfractal.shading.kind_numbers import kind_text
 from tests.devices import device
+from tests.formulas.grown import CARRIED
 from tests.formulas.opencl_batch import HEAD, at_points, formula_kernels, orbit_files
 from tests.render.normals_oracle import unit
 from tests.render.shots import BALL, BALL_RADIUS, PERSPECTIVE, SOLIDS
-from tests.render.traps import TRAP_FORMULAS, Floats, trap_by_numpy, trap_distances, trap_scene
+from tests.render.traps import (
+    TRAP_FORMULAS,
+    Floats,
+    carried_by_numpy,
+    trap_by_numpy,
+    trap_distances,
+    trap_scene,
+)
 from tests.scenes import BALL_ITERATIONS, scene_of
 from tests.small_kernels import LOADS, SmallKernels
 from tests.variants import one_of
@@ -38,6 +46,21 @@ INLINE vec load_vec(__global const scalar *planes, int stride, int first) {{
     return vec_of(load(planes), load(planes + stride), load(planes + 2 * stride));
 }}
 """
+
+_VECTOR = {
+    "variables": {"v": 3},
+    "state": {"p": {"start": "vec(0, 0, 0)", "next": "p + v"}, "still": 3},
+    "map": "2*fold(v, 0.5)",
+    "add": "none",
+    "bounds": {"radius": 2},
+    "bailout": 1,
+}
+# Formulas whose carried numbers colours follow.
+CARRYING: dict[str, dict[str, Any]] = {
+    "carried": {"inline": CARRIED},
+    "a hybrid": {"chain": [{"name": "hast"}, {"inline": CARRIED}]},
+    "of a vector": {"inline": _VECTOR},
+}
 
 QUANTITIES = """
 __kernel void quantities(__global const scalar *points, __global scalar *result, int stride,
@@ -255,6 +278,25 @@ def test_an_orbit_that_starts_outside_has_its_start() -> None:
     point = np.array([[0.0, 7.0, 0.0]])
     found = at_points(built, "traps", point, 4, *uploaded(scene, "float32"))
     np.testing.assert_allclose(found[:, 0], trap_distances(point[0]), rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["carried", "a hybrid", "of a vector"])
+def test_carried_numbers_against_numpy(name: str) -> None:
+    """Of points within and outside, each number by its name."""
+    precision = usable("float64")
+    formula = {**CARRYING[name], "iterations": 6}
+    points = np.random.default_rng(3).uniform(-1.1, 1.1, (64, 3))
+    chain = scene_of(formula, PERSPECTIVE).chain
+    expected = carried_by_numpy(chain, points, 6)
+    assert sum(len(set(each)) > 9 for each in expected.values()) > 1
+    assert (np.linalg.norm(points, axis=1) > chain.bailout).sum() > 4 or name != "of a vector"
+    normals = np.ones((64, 3))
+    for each in (None, *expected):
+        scene = scene_of(formula, PERSPECTIVE, coloring={"by": "carried", "number": each})
+        found = quantity(scene, points, normals, normals, precision)
+        wanted = expected[each or chain.carried[0]]
+        tolerance = 1e-10 if precision == "float64" else 1e-3
+        np.testing.assert_allclose(found, wanted, rtol=tolerance, atol=tolerance)
 
 
 def colors(scene: Scene, table: Floats, quantities: Floats) -> Floats:

@@ -220,6 +220,25 @@ KINDS: dict[str, list[dict[str, Any]]] = {
         )
     ],
     "points by steps": [{"renderer": {"search": "steps", **more}} for more in ({}, {"points": {"count": 4}})],
+    "a hybrid's turns": [
+        {"formula": {"chain": members, "iterations": 9}, "coloring": FEATURES["trap"][0]["coloring"]}
+        for members in (
+            [{"name": "mandelbulb"}, {"name": "mandelbox"}, {"name": "menger_sponge"}],
+            [{"name": "menger_sponge"}, {"name": "mandelbulb"}, {"name": "mandelbox"}],
+            [
+                {"name": "mandelbox", "count": 3},
+                {"name": "mandelbulb", "start": 1, "stop": 4},
+                {"name": "menger_sponge", "start": 2},
+            ],
+        )
+    ],
+    "what colours follow": [
+        {"formula": {"name": "sphereflake"}, "coloring": {"by": "trap"}},
+        *(
+            {"formula": {"name": "sphereflake"}, "coloring": {"by": "carried", "number": name}}
+            for name in ("near", "size")
+        ),
+    ],
     "powers, of programs that know the formula too": [
         {
             "formula": {**FORMULA, "parameters": {"power": power}},

@@ -7,6 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from clfractal.formulas.backends import NumpyBackend
+from clfractal.formulas.chain import Chain
+from clfractal.formulas.reference import apply, constant_of, start
 from clfractal.scene.model import Scene
 from clfractal.shading.kind_numbers import TRAPS
 from tests.render.levels import orbit
@@ -49,3 +52,18 @@ def trap_by_numpy(scene: Scene, points: Floats) -> Floats:
         result = np.where(alive, np.minimum(result, trap_distances(np.stack(z[:3], axis=-1))), result)
         alive &= np.linalg.norm(z, axis=0) <= scene.chain.bailout
     return result
+
+
+def carried_by_numpy(chain: Chain, points: Floats, applications: int) -> dict[str, Floats]:
+    """The carried numbers of points, shape (n,) each, when their orbits end: beyond the bailout, or at the limit."""
+    backend = NumpyBackend()
+    with np.errstate(all="ignore"):
+        state, point = start(chain, points, backend)
+        for application in range(applications):
+            alive = np.linalg.norm(state[: chain.size], axis=0) <= chain.bailout
+            bound = chain.link_at(application).bound
+            found = apply(
+                bound, state, constant_of(bound, point), backend, number=application, carried=chain.carried
+            )
+            state = [np.where(alive, new, old) for new, old in zip(found, state, strict=True)]
+    return dict(zip(chain.carried, state[chain.size :], strict=True))

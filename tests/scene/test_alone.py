@@ -106,7 +106,7 @@ def test_what_a_formula_says_of_itself_decides_and_not_its_name() -> None:
 
 
 def test_kinds_of_colours_that_need_a_set() -> None:
-    needing = {"trap", "iterations", "thickness", "curvature", "layer_distance"}
+    needing = {"trap", "iterations", "thickness", "curvature", "layer_distance", "carried"}
     assert {kind.tag for kind in members("colorings") if kind.needs_set()} == needing
 
 

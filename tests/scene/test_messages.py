@@ -71,7 +71,9 @@ coloring: {palette: ['#000', §'#f8', '#fff']}
 => coloring.palette.1: must be a stop, or a colour as '#ff8800' or '#f80', got '#f8'
 background: {§tpo: 1} => background: unknown key 'tpo'; did you mean 'top'?
 coloring: {by: §depth}
-=> coloring.by: must be solid, normal, iterations, residual, thickness, layer_distance or trap, got 'depth'
+=> coloring.by: must be solid, normal, iterations, residual, thickness, layer_distance, trap or carried, got 'depth'
+coloring: {by: §carried}
+=> coloring.by: carried needs a formula with numbers that are carried, and the scene's have no `state`
 coloring: {by: iterations, palette: §viridiss} => coloring.palette: unknown palette 'viridiss'; did you mean 'viridis'?
 coloring: {palette: §[]} => coloring.palette: must not be empty
 coloring: {palette: §7} => coloring.palette: must be text or a list, got 7

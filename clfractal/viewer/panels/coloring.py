@@ -6,7 +6,7 @@ from typing import Any
 
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.quantity import colorings
-from clfractal.viewer.panels import palette_editor
+from clfractal.viewer.panels import maps, palette_editor
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
@@ -43,7 +43,9 @@ def _own(ui: Ui, keys: tuple[str, ...]) -> None:
         "along": {"segmented": True},
         "step": {"start": step, "auto": f"{step:.3g}"},
     }
-    w.fields(ui, "coloring", [key for key in keys if key != "trap"], **of)
+    w.fields(ui, "coloring", [key for key in keys if key not in ("trap", "number")], **of)
+    if "number" in keys:
+        maps.carried(ui, "coloring.number", ui.studio.scene.coloring.number)
     if "trap" in keys:
         w.group(ui, "Trap")
         fine = {"step": 0.01}

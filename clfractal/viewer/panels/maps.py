@@ -40,8 +40,19 @@ def choice(ui: Ui, path: str, now: str | None, none: str, color: list[float] | N
         w.put(ui, path, None if found == _NONE else found)
 
 
+def carried(ui: Ui, path: str, now: str | None) -> None:
+    """Which of the numbers that the scene's formulas carry is followed at a path."""
+    words = {name: name for name in ui.studio.scene.carried}
+    known = now or next(iter(words), "")
+    found = w.pick(ui, "Number", words, known, path=path, tip=w.value_tip(ui, path), listed=True)
+    if found is not None:
+        w.put(ui, path, found)
+
+
 def draw(ui: Ui, path: str, found: Map) -> None:
-    """The palette, or the curve, of the map at a path; and its trap."""
+    """The palette, or the curve, of the map at a path; its trap, or the number that it follows."""
+    if "number" in found.own_keys:
+        carried(ui, f"{path}.number", found.number)
     if "trap" in found.own_keys:
         w.fields(ui, f"{path}.trap", found.trap.used_keys)
     if isinstance(found, ColorMap) and found.texture is None:

@@ -1,4 +1,5 @@
-// How near the orbit of a point comes to a trap. Its shape is a file of `elements/traps` with this function:
+// What is asked of the orbit of a point: how near it comes to a trap, or a number that goes on beside z. The shape of a trap is a file
+// of `elements/traps` with this function:
 //   real NAME_away(vec offset, vec direction, real radius)     how far the place is whose offset from the centre this is
 typedef struct {
     int shape;
@@ -15,9 +16,10 @@ INLINE real trap_distance(trap near, state z) {
     switch (near.shape) { TRAPS(AWAY) default: return (real)(REAL_LARGEST); }
 }
 
-// How near z comes to a trap after one application or more, the one that leaves the bailout included. An orbit that is
-// outside from the start has only its start.
-INLINE real formula_near(trap near, vec point, mask active, orbit_record orbit, constants k) {
+// The smallest distance of z from the trap after one application or more, the one that leaves the bailout included; or, where `carried`
+// is the number of a name, the number beside z of that name after the last of them. An orbit that is outside from the start has only its
+// start.
+INLINE real formula_told(trap near, int carried, vec point, mask active, orbit_record orbit, constants k) {
     state c, z;
     start(point, k, &c, &z);
     const real at_start = trap_distance(near, z);
@@ -28,15 +30,18 @@ INLINE real formula_near(trap near, vec point, mask active, orbit_record orbit, 
         const state next = apply(n, z, c, k);
         const mask applied = going_on(alive);
         z = state_pick(applied, next, z);
-        nearest = pick(applied, fmin(nearest, trap_distance(near, next)), nearest);
+        if (!carried) nearest = pick(applied, fmin(nearest, trap_distance(near, next)), nearest);
         alive = applied & less_equal(state_square(z), (real)(orbit->bailout_square));
     }
+#if CARRIES_NUMBERS
+    if (carried) return carried_number(carried, z, k);
+#endif
     return pick(less(nearest, (real)(REAL_LARGEST)), nearest, at_start);
 }
 
-// How near the orbit of a point comes to a trap, under the formula that is nearest to the point; where two flow together, between theirs.
-INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, constants k) {
-    if (!JOINED) return formula_near(near, point, active, orbit, k);
+// The same under the formula that is nearest to the point; where two flow together, between theirs.
+INLINE real orbit_told(trap near, int carried, vec point, mask active, orbit_record orbit, constants k) {
+    if (!JOINED) return formula_told(near, carried, point, active, orbit, k);
     surface_point nearest;
     solids_distance(&point, active, ASK_ESTIMATE, orbit, k, &nearest);
     real found = (real)(REAL_LARGEST), other = found;
@@ -47,11 +52,16 @@ INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, co
         const mask here = active & equal(nearest.own.of, number);
         const mask beside = active & less(R(0.0), nearest.share) & equal(nearest.other.of, number);
         if (o->kind != SOLID_FORMULA || !any_lane(here | beside)) continue;
-        const real one = formula_near(near, solid_own(o, point), here | beside, o, k + o->first);
+        const real one = formula_told(near, carried, solid_own(o, point), here | beside, o, k + o->first);
         found = pick(here, one, found);
         other = pick(beside, one, other);
         known |= here;
         other_known |= beside;
     }
     return shared(found, other, known, other_known, nearest.share);
+}
+
+// How near the orbit of a point comes to a trap.
+INLINE real orbit_near(trap near, vec point, mask active, orbit_record orbit, constants k) {
+    return orbit_told(near, 0, point, active, orbit, k);
 }
