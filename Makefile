@@ -13,6 +13,7 @@
 #   make bench         the speed table of this machine
 #   make truth         how near pictures are to the set, by brute force (ARGUMENTS="--formula mandelbulb")
 #   make peers         silhouettes and depths beside the installed Mandelbulber 2, for its examples (ARGUMENTS="--sample 20")
+#   make jacobians     automatic Jacobians of all formulas made of its texts, beside differences with 60 digits
 #   make mutate        60 small mistakes in copies of the program, and whether a test notices (ARGUMENTS="--seed 7 --sample 20")
 #   make gpu-check     what all kernels need on GPUs of NVIDIA and AMD, without one (needs clang-16 and libclc-16)
 #   make portability   the same pictures on every OpenCL implementation (installs those that are missing)
@@ -40,7 +41,7 @@ OLDEST := $(shell for python in python3.11 python3.12 python3.13 python3.14 pyth
 	$$python -c 'import sys; sys.exit(sys.version_info < (3, 11))' >/dev/null 2>&1 && echo $$python && break; done)
 SOURCES := $(shell find clfractal kernels scenes -type f ! -name '*.pyc') pyproject.toml README.md LICENSE docs/clfractal.1
 
-.PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth peers mutate gpu-check portability install clean
+.PHONY: demo view test light combinations window cluster kills soak lint locks lowest bench truth peers jacobians mutate gpu-check portability install clean
 
 demo: $(VENV)/.installed
 	@mkdir -p out
@@ -122,6 +123,9 @@ truth: $(VENV)/.installed
 # What was measured is kept in build/peers.json, and not measured again.
 peers: $(VENV)/.installed
 	$(BIN)/python -m benchmarks.peers $(ARGUMENTS)
+
+jacobians: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.peers.jacobians $(ARGUMENTS)
 
 # Copies of the checkout are changed, so it is the checkout that is tested and not what is installed.
 mutate: $(VENV)/.mutates-with

@@ -50,7 +50,13 @@ class Installed:
         found = None if name is None else self._formulas / f"{name}.cl"
         if found is None or not found.is_file():
             return None
-        return _statements(found), found
+        return statements_of(found), found
+
+    @property
+    def files(self) -> Mapping[Path, int | None]:
+        """All texts, and the number of each; None for one whose number is not known."""
+        known = {name: number for number, name in {**self._numbers, **NAMES}.items()}
+        return {path: known.get(path.stem) for path in sorted(self._formulas.glob("*.cl"))}
 
     @property
     def choices(self) -> Mapping[str, int]:
@@ -73,7 +79,12 @@ def find_installed() -> Installed | None:
 
 
 @cache
-def _statements(path: Path) -> tuple[Statement, ...]:
+def statements_of(path: Path) -> tuple[Statement, ...]:
+    """A text as statements.
+
+    Raises:
+        FileError: it cannot be read, or is outside of the C that is read.
+    """
     content = read_bytes(path, limit=4 * MAX_CHARACTERS)
     return read_formula(content.decode("utf-8", "replace"), path.name)
 
