@@ -16,8 +16,7 @@ from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around,
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
 from clfractal.exchange.solids import solids_of
-from clfractal.exchange.translate import carried_name
-from clfractal.exchange.translated import COLOR
+from clfractal.exchange.translate import COLOR, carried_name
 from clfractal.exchange.view import is_mirrored, view_of
 from clfractal.files.fragments import block_lines
 
@@ -197,13 +196,14 @@ def _without_unused(main: Section) -> None:
         )
 
 
-def _folds_of(section: dict[str, Any]) -> str | None:
-    """The number of a scene's formula that says how a point was folded; None if there is none, or nothing changes it."""
+def _folds_of(section: dict[str, Any] | str) -> str | None:
+    """The number of a scene's formula that says how a point was folded; None if there is none."""
+    if isinstance(section, str):
+        return None
     inline = section.get("inline", {})
     members = [each["inline"] for each in inline.get("chain", [section]) if "inline" in each]
     name = carried_name(COLOR)
-    changed = any(each.get("state", {}).get(name, {"next": name})["next"] != name for each in members)
-    return name if changed else None
+    return name if any(name in each.get("state", {}) for each in members) else None
 
 
 _SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")

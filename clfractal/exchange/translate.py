@@ -24,7 +24,9 @@ MAX_STEPS = 20_000
 MAX_TURNS = 24
 """Of a loop whose end depends on z: it ends then."""
 _SCALARS = ("pos_neg", "cw", "actualScale", "actualScaleA", "temp1000", "addDist", "DE0", "dist")
-_UNSEEN = ("DE", "color", "colorHybrid", "pseudoKleinianDE", "r_dz")
+COLOR = "color"
+"""The field that sums up how a point was folded."""
+_UNSEEN = ("DE", COLOR, "colorHybrid", "pseudoKleinianDE", "r_dz")
 """What is for distances and colours, which are found in another way here."""
 
 
@@ -452,6 +454,9 @@ class Run(Values):
                 if target.name == "dist" and "dist" not in self.carried:
                     what = "has no counterpart: its solid is a shape in space, which each application adds to"
                     raise KeepsError("dist", what, Where(self.file, self.line or None))
+                if target.name == COLOR and self.parameters.colors and COLOR not in self.carried:
+                    what = "has no counterpart: it keeps what colours follow"
+                    raise KeepsError(COLOR, what, Where(self.file, self.line or None))
                 if target.name not in self.aux or target.name in ("i", "const_c"):
                     self.refuse(f"an assignment to aux->{target.name}")
                 self.aux[target.name] = _copied(value)

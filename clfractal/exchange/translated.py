@@ -15,6 +15,7 @@ from clfractal.exchange.parameters import Parameters
 from clfractal.exchange.settings import Section
 from clfractal.exchange.symbols import Symbols, TooLargeError, Value, names_in, written
 from clfractal.exchange.translate import (
+    COLOR,
     NO_FOLDS,
     VARIABLES,
     Applied,
@@ -30,8 +31,6 @@ from clfractal.formulas.build_blocks import MAX_STATEMENTS
 from clfractal.formulas.build_orbit import MAX_LETS
 
 _Found = TypeVar("_Found")
-COLOR = "color"
-"""The field that sums up how a point was folded."""
 _TITLE = 60
 _STEP_SCALE = 0.7
 """Of distances that are a little too large."""
