@@ -1,4 +1,4 @@
-"""How settings choose colours: a palette, along which the orbit's distance from the origin or its folds lead."""
+"""How settings choose colours: a palette, along which the orbit's distance from 0 or its folds lead."""
 
 from __future__ import annotations
 
