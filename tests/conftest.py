@@ -42,8 +42,7 @@ def _decide_once() -> None:
     """The device and the lane count of all tests and of the processes that they start, unless the environment names them.
 
     Users get what is fastest. What is measured beside other tests differs from process to process, also between formulas,
-    and with each other answer all programs are compiled once more. Tests of the choice take these variables away
-    (`nothing_decided`).
+    and with each other answer all programs are compiled once more. Tests of the choice take these variables away.
     """
     # What no process has measured: a test that measures devices would change the choice of those that start later.
     with contextlib.suppress(ClfractalError), pytest.MonkeyPatch.context() as patch:
@@ -104,13 +103,6 @@ def _keep_the_environment() -> None:
 def device() -> Device:
     """The device that pictures are rendered on: the one users get, or CLFRACTAL_DEVICE."""
     return choose()
-
-
-@pytest.fixture
-def nothing_decided(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Neither a device nor a lane count is named by the environment, as for users."""
-    monkeypatch.delenv(select.ENVIRONMENT_VARIABLE, raising=False)
-    monkeypatch.delenv(LANES_VARIABLE, raising=False)
 
 
 @pytest.fixture
