@@ -76,6 +76,7 @@ def is_figure(scene: Path) -> bool:
 # The gallery begins with these: places that one would like to be in.
 FIRST = (
     "lantern_bay",
+    "fractal_tree",
     "jerusalem_cube",
     "cistern",
     "dew",
