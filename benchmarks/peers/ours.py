@@ -51,7 +51,12 @@ def bare(found: Imported, side: int) -> Scene:
         "image": {"width": side + 1, "height": side + 1},
         "lights": [],
         # As much finer as theirs is.
-        "renderer": {"samples": 1, "detail": 0.1, "max_steps": 4000},
+        "renderer": {
+            "samples": 1,
+            "detail": 0.1,
+            "max_steps": 4000,
+            **{key: value for key, value in found.scene["renderer"].items() if key == "bounds"},
+        },
         "material": {"ambient": 0, "specular": 0},
     }
     if objects:

@@ -27,6 +27,8 @@ FINER = 200
 """How much finer their surface is found than they would at this size: theirs is thicker than the set by a pixel."""
 THINNER = 20
 """The same of surfaces whose thickness a file says: finer ones take minutes."""
+LARGER = 2
+"""How much larger pictures are of surfaces that theirs find by steps of a pixel, whatever else a file says."""
 _NOTHING = 65535
 _LEAST = 1e-4
 """Depths below this cannot be told: places have steps of 1.5e-5."""
@@ -137,9 +139,11 @@ def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seco
     asked |= {f"mat{number}_transparency_of_surface": 0 for number in range(1, 10)}
     with tempfile.TemporaryDirectory(prefix="peers-") as folder:
         output = Path(folder, "picture.png")
-        picture(path, output, (side, side), asked, seconds)
-        levels = _read(output.with_name("picture_zbuffer.png"))[..., 0]
-        places = _read(output.with_name("picture_world.png"))
+        each = LARGER if main.flag("iteration_threshold_mode", False) else 1
+        picture(path, output, (each * side, each * side), asked, seconds)
+        # Rays go through the corners of pixels.
+        levels = _read(output.with_name("picture_zbuffer.png"))[::each, ::each, 0]
+        places = _read(output.with_name("picture_world.png"))[::each, ::each]
     farthest = main.number("view_distance_max", 50.0)
     return decoded(levels, places, rays, eye, 1.01 * farthest + 0.1)
 

@@ -11,7 +11,7 @@ from clfractal.errors import FileError, Where
 from clfractal.exchange.colors import coloring_of
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
-from clfractal.exchange.measure import are_inside
+from clfractal.exchange.measure import are_inside, ball_of
 from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around, placing_of
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
@@ -167,6 +167,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
         mirror(scene)
     _hollow_out(scene, settings, installed)
     _leave_out_lamps(scene, remarks)
+    _end_rays(scene, settings.main)
     coloring = coloring_of(settings, remarks, _folds_of(scene["formula"]))
     if coloring is not None:
         scene["coloring"] = coloring
@@ -223,6 +224,30 @@ def _hollow_out(scene: dict[str, Any], settings: Settings, installed: Installed 
     scene["formula"] = formula_of(settings, installed, [], hollow=powers)
     # (Texts that were read again are told once.)
     settings.origins[:] = dict.fromkeys(settings.origins)
+
+
+def _end_rays(scene: dict[str, Any], main: Section) -> None:
+    """Looks for the set no farther than theirs look, where it goes on behind that."""
+    farthest = main.number("view_distance_max", 50.0)
+    eye = scene["camera"]["position"]
+    formulas = [] if scene["formula"] == "none" else [(scene["formula"], _IN_THE_MIDDLE)]
+    formulas += [
+        (each["formula"], each) for each in scene.get("objects", {}).values() if each["type"] == "formula"
+    ]
+    if farthest > 0 and any(_reach(formula, placed, eye) > farthest for formula, placed in formulas):
+        scene["renderer"]["bounds"] = {"center": list(eye), "radius": min(farthest, 1e6)}
+
+
+_IN_THE_MIDDLE: dict[str, Any] = {"position": [0.0, 0.0, 0.0]}
+
+
+def _reach(formula: dict[str, Any], placed: dict[str, Any], eye: list[float]) -> float:
+    """How far from the eye a set may be, by the ball that holds it."""
+    center, radius = ball_of(formula)
+    turn = matrix_of(placed.get("rotation", (0, 0, 0)))
+    size = placed.get("scale", 1.0)
+    own = [part / size for part in Placing(turn, placed["position"]).place(eye)]
+    return float(size * (math.dist(own, center) + radius))
 
 
 def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:

@@ -69,6 +69,22 @@ def are_inside(section: dict[str, Any], points: Sequence[Sequence[float]]) -> li
     return [bool(each) for each in inside]
 
 
+def is_ball(section: dict[str, Any]) -> bool:
+    """Whether the last solid of a scene's section `formula` is the ball of its bailout."""
+    from clfractal.formulas.catalog import resolve
+
+    chain = resolve(section)
+    return chain.rule_index is None and chain.shape_index is None
+
+
+def ball_of(section: dict[str, Any]) -> tuple[tuple[float, ...], float]:
+    """The middle and the radius of the ball that holds the set of a scene's section `formula`."""
+    from clfractal.formulas.catalog import resolve
+
+    chain = resolve(section)
+    return chain.center, chain.radius
+
+
 def _member(link: dict[str, Any]) -> dict[str, Any]:
     return {
         "inline": link["formula"],

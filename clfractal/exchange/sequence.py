@@ -21,7 +21,7 @@ from clfractal.exchange.ends import (
     distance_to_planes,
 )
 from clfractal.exchange.installed import ADD_THEMSELVES, Installed
-from clfractal.exchange.measure import measured
+from clfractal.exchange.measure import is_ball, measured
 from clfractal.exchange.plan import (
     MOST_ITERATIONS,
     TRANSFORMS,
@@ -77,6 +77,10 @@ def formula_of(
         section = _by_texts(plan, slots, main.whole("repeat_from", 1))
     if not joined:
         _without_others(settings)
+    # Where surfaces are those of what does not escape, they depend on it.
+    chosen = main.flag("iteration_threshold_mode", False) and not main.flag("use_default_bailout", True)
+    if chosen and is_ball(section):
+        section["bailout"] = min(max(main.number("bailout", BAILOUT), 1.0), 1e9)
     return section
 
 

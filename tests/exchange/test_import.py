@@ -173,6 +173,33 @@ class TestScenes:
         assert found.remarks == ()
         load_scene(found.scene)
 
+    def test_rays_end_where_theirs_do(self) -> None:
+        # The camera is 6.2 from the middle.
+        joined = "boolean_operators true;\nformula_2 7;\nformula_position_2 0 -5 2;\nformula_scale_2 0.1;"
+        for keys, bounded in (
+            ("", False),
+            ("view_distance_max 8;", False),
+            ("view_distance_max 6;", True),
+            (f"view_distance_max 8;\n{joined}", False),
+            (f"view_distance_max 3;\nfractal_position 0 -9 3;\n{joined}", True),
+        ):
+            scene = load_scene(imported(f"{CAMERA}\n{keys}\nN 9;").scene)
+            assert (scene.surface.bounds is not None) == bounded
+            if bounded:
+                assert scene.bounds == (scene.camera.position, float(keys.split()[1].rstrip(";")))
+
+    def test_a_bailout_of_what_does_not_escape(self) -> None:
+        keys = "N 9;\nuse_default_bailout false;\n"
+        for more, radius in (
+            ("", None),
+            ("iteration_threshold_mode true;", 100),
+            ("iteration_threshold_mode true;\nbailout 20,5;", 20.5),
+            ("iteration_threshold_mode true;\nformula_1 7;\nbailout 20,5;", None),  # it has a shape
+        ):
+            found = imported(f"{CAMERA}\n{keys}{more}").scene
+            assert found["formula"].get("bailout") == radius
+            load_scene(found)
+
     def test_gamma_is_that_of_all_colours(self) -> None:
         keys = "background_3_colors_enable false;\nbackground_color_1 8000 ffff 0;\ngamma 0.5;\nshadows_enabled false;"
         scene = imported(f"{CAMERA}\n{keys}\nmat1_surface_color_gradient 0 800000 5000 00ff00;").scene

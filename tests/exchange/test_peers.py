@@ -174,9 +174,10 @@ def test_our_rays_are_theirs(tmp_path: Path) -> None:
 
 
 @pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
-def test_a_ball_in_both_programs(tmp_path: Path) -> None:
+@pytest.mark.parametrize("more", ["", "iteration_threshold_mode true;\n"])
+def test_a_ball_in_both_programs(more: str, tmp_path: Path) -> None:
     path = tmp_path / "ball.fract"
-    path.write_text(BALL, encoding="utf-8")
+    path.write_text(BALL.replace("formula_1", f"{more}formula_1"), encoding="utf-8")
     found = record(path, 48, 100, tmp_path)
     assert causes.verdict(found) == "alike"
     assert found["spread"] < 1e-4
