@@ -33,6 +33,7 @@ from clfractal.exchange.plan import (
     used_slots,
 )
 from clfractal.exchange.settings import SLOTS, Settings
+from clfractal.exchange.solid_formulas import MOST_FORMULAS
 from clfractal.exchange.translate import NO_FOLDS, Space
 from clfractal.exchange.translated import STAYS, Following, Text, followed_as_needed, text_of
 
@@ -102,6 +103,9 @@ def joined_of(settings: Settings, installed: Installed | None, remarks: list[str
             continue
         place = Place.of(main, slot)
         if slot == 1 and not place.is_elsewhere:
+            continue
+        if len(found) >= MOST_FORMULAS:
+            remarks.append(f"formula_{slot}: no more objects can be formulas")
             continue
         joins = "union" if slot == 1 else _JOINS.get(main.whole(f"boolean_operator_{slot - 1}", 1), "union")
         try:

@@ -10,6 +10,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+MOST_FORMULAS = 8
+"""Objects of a scene that may be formulas."""
 _LEAST = 1e-9
 _THIN = 2e-3
 """How thick shells are to either side, as a part of the solid's least radius or half side."""
@@ -127,7 +129,7 @@ def _wall(wall: str, solid: Mapping[str, Any], wanted: Wanted) -> str:
 
 def _thickness(solid: Mapping[str, Any]) -> float:
     sides = (side / 2 for side in (*solid.get("size", ()), solid.get("height", math.inf)))
-    return _THIN * min(*sides, solid.get("radius", math.inf), solid.get("tube", math.inf))
+    return float(_THIN * min(*sides, solid.get("radius", math.inf), solid.get("tube", math.inf)))
 
 
 _SHAPES: Mapping[str, Callable[[Mapping[str, Any], Wanted], str]] = {

@@ -10,9 +10,10 @@ from clfractal.exchange.look import decoded
 from clfractal.exchange.parameters import rotation
 from clfractal.exchange.placing import angles_of
 from clfractal.exchange.settings import Section
-from clfractal.exchange.solid_formulas import Wanted, as_formula, can_be_formula, size_of
+from clfractal.exchange.solid_formulas import MOST_FORMULAS, Wanted, as_formula, can_be_formula, size_of
 
-MOST, MOST_FORMULAS = 64, 8
+MOST = 64
+"""Objects of a scene."""
 _FLAT = 1e-4
 """How thick what has no thickness is, as a part of its size."""
 _BEGIN = "primitive_"
@@ -36,7 +37,8 @@ def solids_of(main: Section, joined: int, remarks: list[str]) -> tuple[dict[str,
     for kind, number in _enabled(main):
         key = f"{_BEGIN}{kind}_{number}_"
         make = _MAKERS.get(kind)
-        if make is None or len(objects) >= MOST:
+        # (One more may be the limits.)
+        if make is None or len(objects) + joined + 1 >= MOST:
             why = "ours are fewer" if make else f"there is no {kind} among our objects"
             remarks.append(f"{key}enabled: {why}")
             continue

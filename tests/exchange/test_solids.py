@@ -124,6 +124,19 @@ def test_at_most_eight_formulas() -> None:
     load_scene(found.scene)
 
 
+def test_more_than_a_scene_takes() -> None:
+    nine = "\n".join(f"formula_{slot} 7;\nformula_position_{slot} {slot} 0 0;" for slot in range(1, 10))
+    found = import_text(settings(f"{CAMERA}\nN 9;\nboolean_operators true;\n{nine}"), "x.fract")
+    assert list(found.scene["objects"]) == [f"formula {slot}" for slot in range(1, 9)]
+    assert found.remarks == ("formula_9: no more objects can be formulas",)
+    load_scene(found.scene)
+    many = "\n".join(f"primitive_sphere_{number}_enabled true;" for number in range(1, 81))
+    found = import_text(settings(f"{CAMERA}\n{SPONGE}\n{many}\nlimits_enabled true;"), "x.fract")
+    assert len(found.scene["objects"]) == 64
+    assert "limits" in found.scene["objects"]
+    load_scene(found.scene)
+
+
 JOINED = "boolean_operators true;\nformula_1 7;\nN 3;\nboolean_operator_1 0;"
 
 
