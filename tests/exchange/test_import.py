@@ -15,11 +15,22 @@ from clfractal.exchange.installed import find_installed
 from clfractal.exchange.mandelbulber import Imported, import_settings, import_text
 from clfractal.scene.load import load_scene
 from tests.exchange.files import FOLD, check_line, program, settings
+from tests.render.traps import carried_by_numpy
 from tests.shell import InProcess
 
 CAMERA = (
     "camera 3 -5 2;\ntarget 0 1 0.5;\ncamera_top -0.2 0.3 1;\nfov 0.8;\nimage_width 64;\nimage_height 48;"
 )
+
+# A fold that counts itself for colours.
+_FOLDED = """REAL4 OwnIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	REAL4 oldZ = z;
+	if (z.x > 1.0f) z.x = 2.0f - z.x;
+	if (z.x != oldZ.x) aux->color += fractal->mandelbox.color.factor.x;
+	return z * 2.0f;
+}
+"""
 
 
 def imported(main_keys: str = "", fractal: str = "", **options: Any) -> Imported:
@@ -150,6 +161,38 @@ class TestScenes:
         most = imported(f"{CAMERA}\nglow_intensity 90;").scene["glow"]["intensity"]
         assert most == pytest.approx(0.3**2.2, rel=1e-4)
         assert "glow" not in scene
+
+    def test_colours_by_what_a_text_sums_up(self, tmp_path: Path) -> None:
+        folder = program(tmp_path, abox_mod1=_FOLDED, xenodreambuie=_FOLDED)
+        keys = "mat1_surface_color_gradient 0 ff0000 2500 00ff00;\nmat1_coloring_speed 2;\nN 3;\ndont_add_c_constant_1 true;"
+        fractal = "mandelbox_color 0.3 0 0;"
+        found = imported(f"{keys}\nformula_1 64;", fractal, formulas=folder)
+        coloring = found.scene["coloring"]
+        assert (coloring["by"], coloring["number"]) == ("carried", "kept_color")
+        assert coloring["scale"] == pytest.approx(2 * 100 / 2560, rel=1e-5)
+        assert not [each for each in found.remarks if "folds" in each]
+        scene = load_scene(found.scene)
+        points = np.array([[0.4, 0.1, 0.2], [1.2, 0.3, 0.1]])
+        # x is folded where it is beyond 1, and doubled: 1 and 0.3 for each time.
+        expected = []
+        for x, _, _ in points:
+            color, z = 1.0, x
+            for _ in range(3):
+                color += 0.3 * (z > 1)
+                z = 2 * (2 - z if z > 1 else z)
+            expected.append(color)
+        got = carried_by_numpy(scene.chain, points, scene.formula.iterations)["kept_color"]
+        np.testing.assert_allclose(got, expected, rtol=1e-6)
+        assert len(set(expected)) == 2
+        # Others follow the orbit's distance from the origin, and so does this one where a file asks for other colours.
+        for other in (
+            "formula_1 11;",
+            "formula_1 64;\nmat1_fractal_coloring_algorithm 2;",
+            "formula_1 64;\nhybrid_fractal_enable true;\nformula_2 0;",
+        ):
+            scene_of_other = imported(f"{keys}\n{other}", fractal, formulas=folder).scene
+            assert scene_of_other["coloring"]["by"] == "trap"
+            assert "kept_color" not in str(scene_of_other["formula"])
 
     def test_background_is_what_is_seen_above_and_below(self) -> None:
         level = "camera 0 -5 0;\ntarget 0 0 0;\ncamera_top 0 0 1;\nfov 2;"
