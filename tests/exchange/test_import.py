@@ -164,7 +164,8 @@ class TestScenes:
 
     def test_colours_by_what_a_text_sums_up(self, tmp_path: Path) -> None:
         folder = program(tmp_path, abox_mod1=_FOLDED, xenodreambuie=_FOLDED)
-        keys = "mat1_surface_color_gradient 0 ff0000 2500 00ff00;\nmat1_coloring_speed 2;\nN 3;\ndont_add_c_constant_1 true;"
+        keys = "mat1_surface_color_gradient 0 ff0000 2500 00ff00;\nmat1_coloring_speed 2;\nN 3;"
+        keys += "\ndont_add_c_constant_1 true;"
         fractal = "mandelbox_color 0.3 0 0;"
         found = imported(f"{keys}\nformula_1 64;", fractal, formulas=folder)
         coloring = found.scene["coloring"]
