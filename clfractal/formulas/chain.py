@@ -17,6 +17,8 @@ MAX_LINKS = 64
 MAX_COUNT = 1000
 # Applications until turns that are data repeat themselves; those of longer ones are in the text.
 MAX_TABLE = 4096
+# So many turns are in the table even if they repeat themselves before: a remainder costs as much as part of an application.
+USUAL_TABLE = 128
 # An application that no orbit gets to.
 NEVER = 2**31 - 1
 
@@ -228,7 +230,9 @@ class Chain:
     def table(self) -> tuple[tuple[int, ...], int]:
         """The links of applications 0, 1, ..., and how many of them at the end come again and again."""
         last = self.spans[-1]
-        return tuple(self._index_at(n) for n in range(last.begin + last.cycle)), last.cycle
+        cycles = max(-(-(USUAL_TABLE - last.begin) // last.cycle), 1)
+        one = [self._index_at(n) for n in range(last.begin + last.cycle)]
+        return (*one, *(one[last.begin :] * (cycles - 1))), last.cycle
 
     @property
     def cycle_length(self) -> int:
