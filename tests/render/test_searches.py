@@ -54,10 +54,13 @@ ITERATIONS = {
     "vicsek_cross": 3,
     "mandelbox": 8,
     "aexion": 2,
+    "mandalay_box": 2,
+    # Until all mirrors have been met, distances are those to other edges.
+    "polychoron": 16,
 }
 USUAL_ITERATIONS = 4
-# Sheets, needles and ridges that are thinner than a step nearly everywhere: steps see little of them.
-THIN = ("apollonian", "pseudo_kleinian", "riemann_sphere")
+# Sheets, needles, twigs and ridges that are thinner than a step nearly everywhere: steps see little of them.
+THIN = ("apollonian", "fractal_tree", "pseudo_kleinian", "riemann_sphere")
 # One of each kind: an inside by escape, with Jacobians or a scalar derivative, in three dimensions or four, of a chain, and
 # one of folded boxes; a shape, whose inside is the last one's; and one whose orbits leave the range of numbers at once. The
 # others are combinations.
@@ -78,6 +81,8 @@ every_formula = pytest.mark.parametrize(
 # The share of pixels whose solid distance may miss. Of KINDS only the Mengerbulb misses some: stretches of at most 0.4
 # footprints, where its step scale of 1.3 is too long for so few applications (0.8 misses none, in a quarter more steps).
 SLIPS, MISSED = 0.005, ("mengerbulb",)
+# A map that jumps, where another axis is nearest: no distance holds on the other side.
+JUMPS = {"square_by_axis": 0.02}
 EPSILON = {"float32": 2.0**-23, "float64": 2.0**-52}
 
 
@@ -160,7 +165,7 @@ def test_both_searches_show_the_same_solid(device: Device, name: str) -> None:
     assert name in THIN or far.hit.sum() > 0.08 * far.hit.size
     assert np.isfinite(stacked(near.framebuffer, CHANNELS[2:])).all()
     assert np.isfinite(stacked(far.framebuffer, CHANNELS[2:])).all()
-    missed = 0.0 if name in KINDS and name not in MISSED else SLIPS
+    missed = 0.0 if name in KINDS and name not in MISSED else JUMPS.get(name, SLIPS)
     assert (far.hit & ~near.hit).sum() <= missed * far.hit.sum()
 
     shared = far.hit & near.hit

@@ -66,11 +66,13 @@ def voxel_points(place: GridPlace, offset: tuple[float, float, float] = (0.5, 0.
 def inside(chain: Chain, points: Floats, iterations: int) -> npt.NDArray[np.bool_]:
     """Which points of shape (..., 3) belong to the solid."""
     flat = points.reshape(-1, 3)
-    found = reference.escape(chain, flat, iterations)[1]
-    if chain.links[-1].bound.formula.shape is not None:
-        found &= reference.distance(chain, flat, iterations)[0] == 0
-    result: npt.NDArray[np.bool_] = found.reshape(points.shape[:-1])
-    return result
+    if chain.rule_index is not None and chain.degree <= 1:
+        found = reference.own_distance(chain, flat, iterations) == 0
+    elif chain.shape_index is not None:  # whatever becomes of z, here too
+        found = reference.distance(chain, flat, iterations)[0] == 0
+    else:
+        found = reference.escape(chain, flat, iterations)[1]
+    return found.reshape(points.shape[:-1])
 
 
 def decoded(normals: npt.NDArray[np.uint8]) -> tuple[Floats, npt.NDArray[np.bool_]]:
