@@ -98,7 +98,7 @@ def at_points(
     name: str,
     points: Floats,
     planes: int,
-    *constants: npt.NDArray[Any],
+    *constants: npt.NDArray[Any] | np.int32,
     kind: str | None = None,
 ) -> npt.NDArray[Any]:
     """Runs a kernel (points, result, stride, constants...) and gives its planes, shape (planes, n).

@@ -75,7 +75,7 @@ INLINE void store_dual(__global scalar *to, int stride, dual value) {
     store(to + 3 * stride, value.dz);
 }
 #define STORE(s) store(to, z.s); store_dual(to + stride, stride, dual_z.s); to += 5 * stride;
-__kernel void orbits(__global const scalar *points, __global scalar *result, int stride, __constant const scalar *k) {
+__kernel void orbits(__global const scalar *points, __global scalar *result, int stride, int counted, __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;
     points += first;
     const vec point = vec_of(load(points), load(points + stride), load(points + 2 * stride));
@@ -93,11 +93,11 @@ __kernel void orbits(__global const scalar *points, __global scalar *result, int
         store(to, growth);
         to += stride;
         const state before = z;
-        z = apply(n + FIRST_COUNT, z, c, k);
-        dual_z = dual_apply(n + FIRST_COUNT, dual_z, dual_c, k);
+        z = apply(n + counted, z, c, k);
+        dual_z = dual_apply(n + counted, dual_z, dual_c, k);
 #if HAS_DERIVATIVE
         // The state that goes with the scalar rule is the same one, or there is no growth.
-        const state beside = apply_derivative(n + FIRST_COUNT, before, c, &growth, k);
+        const state beside = apply_derivative(n + counted, before, c, &growth, k);
         growth = pick(equal(beside.s0, z.s0) | is_nan(z.s0), growth, (real)(NAN));
         growth = pick(equal(beside.s1, z.s1) | is_nan(z.s1), growth, (real)(NAN));
 #endif
@@ -154,7 +154,8 @@ def orbit(name: str, form: str, precision: Precision) -> Orbit:
     constants = np.array(formula.constants, precision)
     planes = (STEPS + 1) * (5 * size + 1)
     points = points_of(chain)
-    out = at_points(kernels_of(form, precision), f"orbits_f{number}", points, planes, constants)
+    counted = np.int32(chain.starts_counted)
+    out = at_points(kernels_of(form, precision), f"orbits_f{number}", points, planes, counted, constants)
     each = out.reshape(STEPS + 1, 5 * size + 1, len(points)).astype(np.float64)
     states = each[:, :-1].reshape(STEPS + 1, size, 5, len(points))
     return Orbit(states[:, :, 0], states[:, :, 1], states[:, :, 2:], each[:, -1])

@@ -69,7 +69,7 @@ def exact(name: str) -> tuple[Floats, Floats]:
 
 
 def first_count(name: str) -> int:
-    return int("#define FIRST_COUNT 1" in texts("operations")[name].text)
+    return int(chain_of(name).starts_counted)
 
 
 @lru_cache

@@ -72,7 +72,8 @@ def inside(chain: Chain, points: Floats, iterations: int) -> npt.NDArray[np.bool
         found = reference.distance(chain, flat, iterations)[0] == 0
     else:
         found = reference.escape(chain, flat, iterations)[1]
-    return found.reshape(points.shape[:-1])
+    result: npt.NDArray[np.bool_] = found.reshape(points.shape[:-1])
+    return result
 
 
 def decoded(normals: npt.NDArray[np.uint8]) -> tuple[Floats, npt.NDArray[np.bool_]]:
