@@ -75,7 +75,8 @@ INLINE void store_dual(__global scalar *to, int stride, dual value) {
     store(to + 3 * stride, value.dz);
 }
 #define STORE(s) store(to, z.s); store_dual(to + stride, stride, dual_z.s); to += 5 * stride;
-__kernel void orbits(__global const scalar *points, __global scalar *result, int stride, int counted, __constant const scalar *k) {
+__kernel void orbits(__global const scalar *points, __global scalar *result, int stride, int counted,
+                     __constant const scalar *k) {
     const int first = (int)get_global_id(0) * LANES;
     points += first;
     const vec point = vec_of(load(points), load(points + stride), load(points + 2 * stride));

@@ -245,7 +245,8 @@ def results(form: str) -> Floats:
     found = []
     for number, formula in enumerate(formulas):
         constants = np.array(formula.constants, PRECISION)
-        out = at_points(kernels, f"orbits_f{number}", points(), 2 * 16, constants)
+        counted = np.int32(chain_of(number).starts_counted)
+        out = at_points(kernels, f"orbits_f{number}", points(), 2 * 16, counted, constants)
         found.append(out.reshape(2, 16, POINTS)[1, :15].reshape(3, 5, POINTS))
     return np.concatenate(found).astype(np.float64)
 

@@ -353,7 +353,8 @@ def orbits(
         assert constants[0] in (0, 1)
         constants[0] = 0
     planes = (STEPS + 1) * (5 * chain.size + 1)
-    out = at_points(kernels(precision), f"orbits_f{number}", at, planes, constants)
+    counted = np.int32(chain.starts_counted)
+    out = at_points(kernels(precision), f"orbits_f{number}", at, planes, counted, constants)
     each = out.reshape(STEPS + 1, 5 * chain.size + 1, len(at)).astype(np.float64)
     return each[:, :-1].reshape(STEPS + 1, chain.size, 5, len(at))
 
