@@ -244,10 +244,13 @@ _IN_THE_MIDDLE: dict[str, Any] = {"position": [0.0, 0.0, 0.0]}
 def _reach(formula: dict[str, Any], placed: dict[str, Any], eye: list[float]) -> float:
     """How far from the eye a set may be, by the ball that holds it."""
     center, radius = ball_of(formula)
-    turn = matrix_of(placed.get("rotation", (0, 0, 0)))
-    size = placed.get("scale", 1.0)
-    own = [part / size for part in Placing(turn, placed["position"]).place(eye)]
-    return float(size * (math.dist(own, center) + radius))
+    return float(placed.get("scale", 1.0) * (math.dist(_own(placed, eye), center) + radius))
+
+
+def _own(placed: dict[str, Any], place: list[float]) -> list[float]:
+    """A place in the space of a formula that is an object."""
+    placing = Placing(matrix_of(placed.get("rotation", (0, 0, 0))), placed["position"])
+    return [part / placed.get("scale", 1.0) for part in placing.place(place)]
 
 
 def _leave_out_lamps(scene: dict[str, Any], remarks: list[str]) -> None:
@@ -278,10 +281,7 @@ def _held(scene: dict[str, Any], places: list[list[float]]) -> list[bool]:
     for each in scene.get("objects", {}).values():
         if each["type"] != "formula" or each.get("join", "union") != "union":
             continue
-        turn = matrix_of(each.get("rotation", (0, 0, 0)))
-        placing, scale = Placing(turn, each["position"]), each.get("scale", 1.0)
-        own = [[part / scale for part in placing.place(place)] for place in places]
-        more = are_inside(each["formula"], own)
+        more = are_inside(each["formula"], [_own(each, place) for place in places])
         found = [a or b for a, b in zip(found, more, strict=True)]
     return found
 

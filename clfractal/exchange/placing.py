@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from clfractal.exchange.parameters import Matrix, rotation, times, transposed
-from clfractal.exchange.settings import Settings
+from clfractal.exchange.settings import Section, Settings
 
 _ORIGIN = (0.0, 0.0, 0.0)
 
@@ -33,6 +33,12 @@ class Placing:
     def direction(self, direction: Vector) -> list[float]:
         """A direction in the set's space."""
         return [sum(a * b for a, b in zip(row, direction, strict=True)) + 0.0 for row in self.turn]
+
+
+def reach_from(main: Section, place: Vector) -> float:
+    """How far from a place anything is seen: nothing is farther from the eye than they look."""
+    away = math.dist(main.vector("camera", (3, -6, 2)), place)
+    return away + max(main.number("view_distance_max", 50.0), 0.1)
 
 
 def placing_of(settings: Settings) -> Placing | None:

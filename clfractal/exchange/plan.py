@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.installed import ADD_NOTHING, ADD_SWAPPED, ADD_THEMSELVES, Installed
 from clfractal.exchange.parameters import rotation
-from clfractal.exchange.placing import angles_of
+from clfractal.exchange.placing import angles_of, reach_from
 from clfractal.exchange.settings import SLOTS, Section, Settings
 from clfractal.exchange.translate import Folds
 from clfractal.exchange.translated import Addition
@@ -126,7 +125,8 @@ def plan_of(
         w,
         is_mirrored(settings),
         tuple(max(each, 0.0) for each in repeats),
-        _reach(main, place),
+        # In its own units.
+        reach_from(main, place.position) / place.size,
         _folds(main),
         installed,
         remarks,
@@ -142,12 +142,6 @@ def _folds(main: Section) -> Folds:
         box if main.flag("box_folding", False) else None,
         ball if main.flag("spherical_folding", False) else None,
     )
-
-
-def _reach(main: Section, place: Place) -> float:
-    """How far from its middle anything of a formula is seen, in its own units: nothing is farther away than they look."""
-    away = math.dist(main.vector("camera", (3, -6, 2)), place.position)
-    return (away + max(main.number("view_distance_max", 50.0), 0.1)) / place.size
 
 
 def used_slots(settings: Settings, hybrid: bool, joined: bool) -> list[int]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
 from clfractal.exchange.look import decoded
 from clfractal.exchange.parameters import rotation
-from clfractal.exchange.placing import angles_of
+from clfractal.exchange.placing import angles_of, reach_from
 from clfractal.exchange.settings import Section
 from clfractal.exchange.solid_formulas import MOST_FORMULAS, Wanted, as_formula, can_be_formula, size_of
 
@@ -52,7 +51,7 @@ def solids_of(main: Section, joined: int, remarks: list[str]) -> tuple[dict[str,
         wanted = _wanted(main, key, found)
         if can_be_formula(found) and not wanted.is_plain:
             if formulas < MOST_FORMULAS:
-                objects[f"{kind} {number}"] = as_formula(found, wanted, _reach(main, found["position"]))
+                objects[f"{kind} {number}"] = as_formula(found, wanted, reach_from(main, found["position"]))
                 formulas += 1
             else:
                 remarks.append(f"{key}enabled: it is plain, as no more objects can be formulas")
@@ -80,13 +79,6 @@ def _is_cut(main: Section, solid: dict[str, Any]) -> bool:
     size = size_of(solid)
     return any(
         place - size < a or place + size > b for place, a, b in zip(solid["position"], low, high, strict=True)
-    )
-
-
-def _reach(main: Section, place: Vector) -> float:
-    """How far from a place anything is seen."""
-    return math.dist(main.vector("camera", (3, -6, 2)), place) + max(
-        main.number("view_distance_max", 50.0), 0.1
     )
 
 

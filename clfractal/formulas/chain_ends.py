@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -30,7 +31,7 @@ class Leaf:
     carried: int = 0
 
 
-class EndsWriter:
+class EndsWriter(ABC):
     """What all functions of a chain are written with, and those of its ends.
 
     Where turns are data any link may be the first one, and the last: what differs between them is passed.
@@ -217,11 +218,11 @@ class EndsWriter:
         value = self.full(number_type, emitter.emit(node))
         return function_text(f"INLINE {number_type} {head}", emitter.lines, f"return {value};")
 
+    @abstractmethod
     def emitter(
         self, index: int, number_type: NumberType, *, branches: bool = False, usual: bool = False
     ) -> ScopedEmitter:
         """An emitter for what a link makes of z."""
-        raise NotImplementedError
 
 
 def parameters_of(bound: BoundFormula) -> dict[str, Value]:
