@@ -15,8 +15,9 @@ from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64
 MAX_COUNT = 1000
-# Applications until turns that are data repeat themselves; those of longer ones are in the text.
-MAX_TABLE = 4096
+# Applications until turns that are data repeat themselves; those of longer ones are in the text. The tables of all
+# formulas of a scene fit in the constant memory that every device has.
+MAX_TABLE = 768
 # So many turns are in the table even if they repeat themselves before: a remainder costs as much as part of an application.
 USUAL_TABLE = 128
 # An application that no orbit gets to.

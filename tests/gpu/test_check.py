@@ -16,8 +16,10 @@ from clfractal.device.orbit import ORBIT
 from clfractal.device.source import FlatText, SourceMap
 from clfractal.device.structs import Precision
 from clfractal.formulas import catalog
+from clfractal.formulas.chain import MAX_TABLE, Chain
 from clfractal.formulas.opencl import write_formula
 from clfractal.scene.checks import MAX_PLANES
+from clfractal.scene.objects import MAX_FORMULAS
 from tests.gpu import __main__ as command
 from tests.gpu import compilers, limits, listing, record, table
 from tests.gpu.compilers import Compilers, MissingCompilerError, RejectedError
@@ -250,10 +252,16 @@ def test_words_that_devices_lack(code: str) -> None:
 
 @pytest.mark.parametrize("precision", ["float32", "float64"])
 def test_the_longest_lists_fit_constant_memory(precision: Precision) -> None:
-    """The orbits of the object and of all planes; constants of a formula of the library are few."""
+    """The orbits of the object and of all planes; the constants of all formulas of a scene, with the longest turns."""
     assert (1 + MAX_PLANES) * ORBIT.dtype(precision).itemsize <= limits.CONSTANT_BYTES
-    most = max(len(write_formula(catalog.load_chain(name)).constants) for name in catalog.names())
-    assert 0 < 100 * most * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    chains = [catalog.load_chain(name) for name in catalog.names()]
+    most = max(len(write_formula(chain).constants) - len(_turns(chain)) for chain in chains)
+    each = 1 + max(most, 100) + MAX_TABLE
+    assert 0 < most and (1 + MAX_FORMULAS) * each * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+
+
+def _turns(chain: Chain) -> tuple[int, ...]:
+    return chain.table[0] if chain.turns_are_data else ()
 
 
 def test_words_that_are_no_such_words() -> None:
