@@ -33,10 +33,13 @@ class Parameters:
 
     Args:
         colors: whether those of colours count.
+        solids: whether what the formula says of solids in space does.
     """
 
-    def __init__(self, section: Section, choices: Mapping[str, int], *, colors: bool = False) -> None:
-        self.section, self.choices, self.colors = section, choices, colors
+    def __init__(
+        self, section: Section, choices: Mapping[str, int], *, colors: bool = False, solids: bool = True
+    ) -> None:
+        self.section, self.choices, self.colors, self.solids = section, choices, colors, solids
 
     def value(self, path: str, indices: Sequence[int] = ()) -> Found:
         """A field, such as `transformCommon.scale3`; of an array with its indices.

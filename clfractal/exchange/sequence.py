@@ -6,6 +6,7 @@ gives the point; so they have one application more. Where that is not the same, 
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from typing import Any
 
@@ -42,6 +43,8 @@ FOLLOWED = 260
 """Applications that are followed one by one; those after them are as the last ones."""
 _CHOSEN = (2, 20)
 """The first version whose files choose what a distance is made by."""
+_POWERS = re.compile("^(mandelbulb|quaternion|hypercomplex)")
+"""How the names of texts begin whose formulas raise a place to a power."""
 
 
 def formula_of(
@@ -154,7 +157,8 @@ def _by_library(plan: Plan, slot: Slot) -> dict[str, Any] | None:
 
 def _by_texts(plan: Plan, slots: Sequence[Slot], repeat: int) -> dict[str, Any]:
     """Formulas by their texts, as a chain."""
-    texts = {slot.slot: _text(plan, slot) for slot in slots}
+    solids = _counts_solids(plan, slots)
+    texts = {slot.slot: _text(plan, slot, solids=solids) for slot in slots}
     order = turns(slots, repeat, min(plan.most, FOLLOWED))
     followed, following = _all_followed(plan, slots, texts, order)
     size = len(followed[0]["variables"])
@@ -225,17 +229,14 @@ def _last(plan: Plan, slots: Sequence[Slot], texts: dict[int, Text]) -> str | No
     """The distance by the end of orbits, where all formulas are of a kind that has one of its own, or transforms."""
     if plan.hollow is not None:
         return None
-    wanted = plan.settings.main.text("delta_DE_function").strip()
-    # (In files of before 2.20 it has no effect.)
-    chosen = (plan.settings.version or _CHOSEN) >= _CHOSEN
+    wanted = _wanted(plan)
     kinds = (
         (DISCS, ("3", "pseudo_kleinian"), distance_to_disc),
         (PLANES, ("4", "jos_kleinian"), distance_to_planes),
     )
     own = [slot for slot in slots if slot.number < TRANSFORMS]
     for kind, names, distance in kinds:
-        fits = not chosen or wanted in ("", "0", "preferred", *names)
-        if own and fits and all(slot.number in kind for slot in own):
+        if own and (wanted in names if wanted else all(slot.number in kind for slot in own)):
             return distance(texts[own[0].slot].parameters)
     return None
 
@@ -244,10 +245,27 @@ def _later(link: dict[str, Any]) -> dict[str, int]:
     return {"stop": link["stop"] + 1} if "stop" in link else {}
 
 
-def _text(plan: Plan, slot: Slot) -> Text:
+def _wanted(plan: Plan) -> str | None:
+    """The distance that a file chooses; empty where that follows from its formulas, None in files that have no choice."""
+    # (In files of before 2.20 it has no effect.)
+    if (plan.settings.version or _CHOSEN) < _CHOSEN:
+        return None
+    wanted = plan.settings.main.text("delta_DE_function").strip()
+    return "" if wanted in ("0", "preferred") else wanted
+
+
+def _counts_solids(plan: Plan, slots: Sequence[Slot]) -> bool:
+    """Whether solids that transforms put into space count: not beside powers, whose distance is preferred to theirs."""
+    if plan.installed is None or _wanted(plan) != "":
+        return True
+    files = [plan.installed.text(slot.number) for slot in slots if slot.number < TRANSFORMS]
+    return not any(found is not None and _POWERS.match(found[1].name) for found in files)
+
+
+def _text(plan: Plan, slot: Slot, *, solids: bool) -> Text:
     fractal = plan.settings.fractal(slot.slot)
     where = plan.settings.main.where(f"formula_{slot.slot}")
-    found = text_of(slot.number, fractal, plan.installed, colors=follows_folds(plan.settings))
+    found = text_of(slot.number, fractal, plan.installed, colors=follows_folds(plan.settings), solids=solids)
     if found is not None and slot.weight == 0:  # its turn leaves z where it is
         found.statements = STAYS
     if found is None:

@@ -451,6 +451,8 @@ class Run(Values):
         if target.kind == "member":
             owner = target.parts[0]
             if owner.kind == "name" and owner.name == "aux":
+                if target.name == "dist" and not self.parameters.solids:
+                    return
                 if target.name == "dist" and "dist" not in self.carried:
                     what = "has no counterpart: its solid is a shape in space, which each application adds to"
                     raise KeepsError("dist", what, Where(self.file, self.line or None))

@@ -55,7 +55,10 @@ class Addition:
 
 @dataclass
 class Text:
-    """A formula's text, and the parameters that it is followed with; `colors`: also for what colours follow."""
+    """A formula's text, and the parameters that it is followed with; `colors`: also for what colours follow.
+
+    `solids`: what it says of solids in space counts.
+    """
 
     number: int
     statements: tuple[Statement, ...]
@@ -63,14 +66,15 @@ class Text:
     fractal: Section
     choices: Mapping[str, int]
     colors: bool = False
+    solids: bool = True
     parameters: Parameters = field(init=False)
 
     def __post_init__(self) -> None:
-        self.parameters = Parameters(self.fractal, self.choices, colors=self.colors)
+        self.parameters = Parameters(self.fractal, self.choices, colors=self.colors, solids=self.solids)
 
 
 def text_of(
-    number: int, fractal: Section, installed: Installed | None, *, colors: bool = False
+    number: int, fractal: Section, installed: Installed | None, *, colors: bool = False, solids: bool = True
 ) -> Text | None:
     """The text of a formula; None if it is not there.
 
@@ -80,7 +84,7 @@ def text_of(
     found = None if installed is None else installed.text(number)
     if found is None or installed is None:
         return None
-    return Text(number, *found, fractal, installed.choices, colors)
+    return Text(number, *found, fractal, installed.choices, colors, solids)
 
 
 @dataclass
@@ -175,11 +179,11 @@ class Following:
             for name in self.carried
         }
         found: dict[str, Any] = {"state": state}
-        if "dist" in self.carried:
-            found["distance"] = carried_name("dist")
-        elif self.last is not None:
+        if self.last is not None:
             found["distance"] = self.last
             found["step_scale"] = _STEP_SCALE
+        elif "dist" in self.carried:
+            found["distance"] = carried_name("dist")
         return found
 
     def ending(self, formula: dict[str, Any], checks: bool) -> dict[str, Any]:

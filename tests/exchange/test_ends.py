@@ -11,6 +11,7 @@ import pytest
 from benchmarks.peers import causes, theirs
 from benchmarks.peers.one import record
 from clfractal.exchange.ends import ending
+from clfractal.exchange.mandelbulber import import_settings
 from clfractal.formulas.catalog import resolve
 from clfractal.formulas.reference import own_distance
 from tests.exchange.files import settings
@@ -81,3 +82,28 @@ def test_halls_in_both_programs(tmp_path: Path) -> None:
     found = record(path, 48, 100)
     assert causes.verdict(found) == "alike", found
     assert found["ninth"] < 0.01
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+def test_a_file_chooses_the_distance_of_its_solids(tmp_path: Path) -> None:
+    """Tubes by folds that also put spheres into space: what counts are the tubes, as in their picture."""
+    path = tmp_path / "tubes.fract"
+    text = "formula_1 604;\nN 12;\ndelta_DE_function {};\ncamera 4 -7 3;\ntarget 0 0 0;\ncamera_top 0 0 1;"
+    kept = []
+    for wanted in (3, 5):
+        path.write_text(settings(text.format(wanted)), encoding="utf-8")
+        found = record(path, 48, 100)
+        assert found["union"] > 0.97, (wanted, found)
+        kept.append(found["covered"])
+    assert abs(kept[0] - kept[1]) > 0.02
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+@pytest.mark.parametrize(("number", "solid"), [(3, False), (10, True)])
+def test_solids_beside_powers_do_not_count(tmp_path: Path, number: int, *, solid: bool) -> None:
+    path = tmp_path / "beside.fract"
+    path.write_text(
+        settings(f"formula_1 {number};\nformula_2 1603;\nhybrid_fractal_enable true;"), encoding="utf-8"
+    )
+    members = import_settings(path).scene["formula"]["inline"]["chain"]
+    assert ("distance" in members[-1]["inline"]) is solid
