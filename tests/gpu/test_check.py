@@ -257,7 +257,8 @@ def test_the_longest_lists_fit_constant_memory(precision: Precision) -> None:
     chains = [catalog.load_chain(name) for name in catalog.names()]
     most = max(len(write_formula(chain).constants) - len(_turns(chain)) for chain in chains)
     each = 1 + max(most, 100) + MAX_TABLE
-    assert 0 < most and (1 + MAX_FORMULAS) * each * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
+    assert most > 0
+    assert (1 + MAX_FORMULAS) * each * np.dtype(precision).itemsize <= limits.CONSTANT_BYTES
 
 
 def _turns(chain: Chain) -> tuple[int, ...]:
