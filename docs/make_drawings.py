@@ -308,7 +308,7 @@ _PLAIN: tuple[tuple[str, tuple[str, ...]], ...] = (
     ),
     (
         "what is seen there",
-        ("send_to_lights?", "send_air?", "color_interactions?", "find_planes?", "add_glow?"),
+        ("send_to_lights?", "send_air?", "color_interactions?", "find_planes?", "add_glow?", "find_mist?"),
     ),
     (
         "direct light, mirrors",
@@ -356,6 +356,7 @@ _ASK_FORMULA = (
     "march_inside",
     "color_interactions",
     "add_glow",
+    "find_mist",
     "find_faces",
     "find_planes",
 )

@@ -153,7 +153,7 @@ SURFACE: Mapping[str, Values] = {
     "fog": {
         "": {},
         "shafts": {"fog": {"density": 0.05, "height": 2, "scattering": {}}},
-        "glow": {"glow": {"by": "trap"}},
+        "glow": {"glow": {"by": "trap"}, "mist": {"by": "iterations"}},
     },
     **_OFTEN,
 }

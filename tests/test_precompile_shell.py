@@ -163,6 +163,7 @@ def of_a_surface(tmp_path_factory: pytest.TempPathFactory) -> set[str]:
         "lighting={mode: path}",
         "coloring={by: trap, trap: {shape: sphere}}",
         "glow={by: trap}",
+        "mist={by: iterations}",
         "objects={ball: {type: sphere, position: [1.5, 0, 0], radius: 0.3}}",
         "objects={ball: {type: sphere, position: [1, 0, 0], radius: 0.3, join: smooth_union}}",
         "cut_planes=[{plane: {center: [0, 0, 0], normal: [1, -1, 0.2], width: 2, height: 2}, cut: true}]",

@@ -244,6 +244,13 @@ LAYERS = _struct(
     ("vec", "point", ""),
     ("real", "count", "escape count"),
 )
+MIST = _struct(
+    "mist_seen",
+    "What the fog around the set does to what the eye's ray shows.",
+    ("color", "light", "that it adds"),
+    ("real", "passes", "the part of what is behind that comes through"),
+    ("real", "fogged", "the part of the other fog's colour that stands before what it hides"),
+)
 AOVS = _struct(
     "aovs",
     "What a sample knows of its layers before its end.",
@@ -311,6 +318,7 @@ TYPES = (
     LIGHT_BEFORE,
     FACE,
     LAYERS,
+    MIST,
     AOVS,
 )
 

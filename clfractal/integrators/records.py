@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -18,6 +19,7 @@ from clfractal.integrators.plan import Plan
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.glow import Glow
 from clfractal.scene.light_paths import PathLighting
+from clfractal.scene.mist import MAX_STOPS, Mist
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import Gradient, Image
 from clfractal.schema.base import unit
@@ -97,6 +99,17 @@ MATERIAL = Struct(
         Field("glow_center", "real", 3, "of its trap, as for colours"),
         Field("glow_direction", "real", 3, ""),
         Field("glow_radius", "real", 0, ""),
+        Field("mist_by_count", "int", 0, "1: where it is dense follows escape counts; 0: distances"),
+        Field("mist_density", "real", 0, "where it is densest, per scene unit"),
+        Field("mist_width", "real", 0, "how far from there it is half as dense, scene units"),
+        Field("mist_distance", "real", 0, "how far from the set that is"),
+        Field("mist_start", "real", 0, "escape count up to which there is none"),
+        Field("mist_rise", "real", 0, "1 / the counts from there to where it is densest"),
+        Field("mist_at", "real", MAX_STOPS, "distance or count of each stop of its colours; all there are"),
+        Field(
+            "mist_slope", "real", MAX_STOPS, "1 / what lies between a stop and the one before; 0: it is none"
+        ),
+        Field("mist_colors", "real", 3 * MAX_STOPS, "linear Rec. 709"),
         Field("environment_seen", "int", 0, "1: the environment is seen past the set"),
         Field("transparent", "int", 0, "1: no background is composited under"),
         Field("environment_intensity", "real", 0, "factor on the environment's light"),
@@ -107,6 +120,7 @@ MATERIAL = Struct(
         Field("environment_columns", "int", 0, "size of its tables, cells"),
         Field("environment_rows", "int", 0, ""),
     ],
+    kinds=[("MIST_STOPS", MAX_STOPS)],
 )
 
 # Inside tests of a way through the set besides its full steps: the growing ones at its start, and the bisection.
@@ -219,6 +233,7 @@ def material_record(
         "fog_anisotropy": shafts.anisotropy if shafts else 0.0,
         "fog_background": int(fog is not None and fog.background and fog.density > 0),
         **_glow(scene),
+        **_mist(scene),
         "environment_seen": int(scene.environment is not None and scene.environment.background),
         "transparent": int(gradient is None),
         **material_fields(scene.environment, environment),
@@ -238,6 +253,26 @@ def _glow(scene: Scene) -> dict[str, object]:
         "glow_center": glow.trap.center,
         "glow_direction": unit(glow.trap.direction),
         "glow_radius": glow.trap.radius,
+    }
+
+
+def _mist(scene: Scene) -> dict[str, object]:
+    """The fields of a Material for `kernels/integrators/mist.cl`."""
+    mist, radius = scene.mist or Mist(), scene.bounds[1]
+    places = [stop.at for stop in mist.colors]
+    more = MAX_STOPS - len(places)
+    # (Where a colour changes at once, the slope only has to be too steep to be seen.)
+    slopes = [0.0, *(1 / max(after - before, 1e-9) for before, after in pairwise(places))]
+    return {
+        "mist_by_count": int(mist.by == "iterations"),
+        "mist_density": mist.used_density(radius),
+        "mist_width": mist.used_width(radius),
+        "mist_distance": mist.distance,
+        "mist_start": mist.start,
+        "mist_rise": 1 / max(mist.used_end(scene.formula.iterations) - mist.start, 1e-6),
+        "mist_at": [*places, *[0.0] * more],
+        "mist_slope": [*slopes, *[0.0] * more],
+        "mist_colors": [part for stop in mist.colors for part in stop.color] + [0.0] * (3 * more),
     }
 
 

@@ -28,6 +28,7 @@ from clfractal.integrators.path_state import (
     LAYERS,
     LENS_SAMPLE,
     LIGHT_BEFORE,
+    MIST,
     PARTS_OF_LIGHT,
     PATH,
     PIXEL,
@@ -118,6 +119,7 @@ PARTS = (
     # The sum, and what is awaited of turns whose light has a colour of its own.
     Part("AIR", 3, lambda scene, plan: int(air_turns(scene) > 0) + wide_air_turns(scene)),
     Part("GLOW", 3, lambda scene, plan: int(scene.glow is not None)),
+    Part("MIST", MIST.numbers, lambda scene, plan: int(scene.mist is not None)),
     # What the formula was asked for the present interaction's material; and the same around it, with the normal and escape
     # count there, for the slopes of its material's relief (`kernels/shading/bump_places.h`).
     Part("ASKED", 1, lambda scene, plan: len(asked_maps(scene))),

@@ -267,6 +267,7 @@ PROGRAMS = (
         "colors", "integrators/color_interactions.cl", ("color_interactions",), state_defines, formula=True
     ),
     _Program("glow", "integrators/glow.cl", ("add_glow",), state_defines, formula=True),
+    _Program("mist", "integrators/mist.cl", ("find_mist",), state_defines, formula=True),
     _Program(
         "planes",
         "geometry/see_planes.cl",

@@ -9,9 +9,9 @@ Rays of a purpose are sent by one stage, marched by another, which knows the for
 
 with `[meet_objects]` before each march and `[look_at_objects]` after those that look for an interaction, with
 `[send_to_lights]` after the interactions and `[meet_lights] [gather_light]` before `light_interactions` where direct
-light comes from more than single directions, with `[find_planes]` and `[add_glow]` after `[color_interactions]`, and
-with `[find_faces]` before the march of rays that look for an interaction; each mirror adds what follows `begin_samples`
-but for the points. With `lighting.mode: path` in the place of the last two
+light comes from more than single directions, with `[find_planes]`, `[add_glow]` and `[find_mist]` after
+`[color_interactions]`, and with `[find_faces]` before the march of rays that look for an interaction; each mirror adds
+what follows `begin_samples` but for the points. With `lighting.mode: path` in the place of the last two
 
     [find_materials]  scatter_paths  march  gather_paths
 
@@ -304,6 +304,7 @@ def _sample(scene: Scene, sample: int, plan: Plan, *, cones: bool) -> Iterator[S
         yield from asked_formula(bounce)
         yield from when(scene.cut_planes and bounce == 0 and not paths, stage("find_planes"))
         yield from when(scene.glow is not None, stage("add_glow", bounce=bounce))
+        yield from when(scene.mist is not None and bounce == 0, stage("find_mist"))
         if paths:
             yield from when(has_media(scene), stage("cross_media", 1, bounce=bounce))
             yield from asked_material(bounce)

@@ -40,8 +40,9 @@ def _asking(scene: Scene) -> Iterator[tuple[str, str, str]]:
         for key, each in maps_of(material):
             if each.kind is not None and each.kind.needs_set():
                 yield f"materials.{name}.{key}.by", f"{each.by} needs", "use another quantity, or a texture"
-    if scene.glow is not None:
-        yield "glow", "needs", "remove it"
+    for key, given in (("glow", scene.glow), ("mist", scene.mist)):
+        if given is not None:
+            yield key, "needs", "remove it"
     for number, light in enumerate(scene.lights):
         if isinstance(light, SetLight):
             yield f"lights.{number}.type", "set needs", "remove this light"

@@ -115,10 +115,11 @@ def _check_carried(scene: Scene) -> None:
 
 
 def _check_glow(scene: Scene) -> None:
-    if scene.glow is not None and not isinstance(scene.renderer, SurfaceRenderer):
-        raise SceneError(
-            f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path="glow")
-        )
+    for key, given in (("glow", scene.glow), ("mist", scene.mist)):
+        if given is not None and not isinstance(scene.renderer, SurfaceRenderer):
+            raise SceneError(
+                f"is for surface renderers, got a {scene.renderer.type}; remove it", Where(path=key)
+            )
 
 
 def _check_channels(scene: Scene) -> None:

@@ -10,6 +10,7 @@ from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlanes
 from clfractal.scene.glow import Glow
 from clfractal.scene.lighting import Environment, Fog, Lights
+from clfractal.scene.mist import Mist
 from clfractal.scene.parts import Background, Camera, Material
 from clfractal.scene.renderer import Renderer
 from clfractal.schema.base import Color, Fraction, Section, problem, rule
@@ -47,6 +48,7 @@ class LayoutView(Section):
     )
     fog: Fog | None = Field(None, description="replaces the scene's fog; null: keeps it")
     glow: Glow | None = Field(None, description="replaces the scene's glow; null: keeps it")
+    mist: Mist | None = Field(None, description="replaces the scene's mist; null: keeps it")
     cut_planes: CutPlanes | None = Field(
         None, description="replaces the scene's cut planes; null: keeps them, except for a cut_plane renderer"
     )

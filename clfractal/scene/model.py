@@ -24,6 +24,7 @@ from clfractal.scene.layout import Layout, Place
 from clfractal.scene.light_paths import Lighting, PathLighting
 from clfractal.scene.lighting import Environment, Fog, Lights
 from clfractal.scene.materials import Materials
+from clfractal.scene.mist import Mist
 from clfractal.scene.moved_cameras import with_words
 from clfractal.scene.named_files import grid_files, light_files, texture_files
 from clfractal.scene.objects import FormulaObject, Objects, VolumeObject, ball_around, ball_of_both
@@ -80,6 +81,7 @@ class Scene(Section):
     environment: Environment | None = None
     fog: Fog | None = None
     glow: Glow | None = None
+    mist: Mist | None = None
     objects: Objects = Field({}, description="shapes, water, formulas and volumes by name")
     cut_planes: CutPlanes = Field(
         (), description="planes that are shown in the picture or cut the object open"

@@ -31,7 +31,7 @@ def draft(scene: Scene) -> Scene:
     """
     if not isinstance(scene.lighting, PathLighting):
         return scene
-    update: dict[str, object] = {"lighting": DirectLighting(), "fog": None, "glow": None}
+    update: dict[str, object] = {"lighting": DirectLighting(), "fog": None, "glow": None, "mist": None}
     lights = tuple(light.model_copy(update={"shadow": False}) for light in scene.lights)
     camera, environment = scene.camera, scene.environment
     own = scene.materials.get(scene.material.name or "")

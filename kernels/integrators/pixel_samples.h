@@ -69,12 +69,22 @@ INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen
             background = color_mix(mist, background, passes_all);
         }
     }
+    color mist_light = color_of(R(0.0), R(0.0), R(0.0));
+    if (KEEPS(s, STATE_MIST)) {
+        STATE_KEPT(s, mist_seen, around, STATE_MIST);
+        mist_light = around.light;
+        const color before = color_scale(color_splat(w.material->fog_color), around.fogged);
+        seen = color_add(color_add(color_scale(seen, around.passes), mist_light), before);
+        background = color_add(color_scale(background, around.passes), mist_light);
+        if (w.material->fog_background) background = color_add(background, before);
+        comes *= pick(result.hit, around.passes, R(1.0));
+    }
     color air = color_of(R(0.0), R(0.0), R(0.0)), glow = air;
     if (KEEPS(s, STATE_AIR)) STATE_RECALL(s, air, STATE_AIR);
     if (KEEPS(s, STATE_GLOW)) STATE_RECALL(s, glow, STATE_GLOW);
     seen = color_add(color_add(seen, air), glow);
     // With a transparent background what is not hit adds nothing, so that R, G, B come out premultiplied.
-    if (w.material->transparent) background = color_of(R(0.0), R(0.0), R(0.0));
+    if (w.material->transparent) background = mist_light;
     background = color_add(background, air);
     // What clouds have added to a ray that went through all of them.
     if (HAS(w, SHINING_CLOUDS)) background = color_add(background, on_the_way);
@@ -98,7 +108,7 @@ INLINE pixel_sample sample_of(stage s, camera_sample a, ray from_eye, color seen
     result.of_light = parts_of(outputs, in_all, found.normal, comes, w);
     // Rays that meet nothing have seen what shines before it.
     const color past = color_scale(in_all, pick(mask_of(found.found), R(0.0), of_past));
-    result.of_light.emission = color_add(color_add(result.of_light.emission, past), color_scale(glow, of_ways + of_past));
+    result.of_light.emission = color_add(color_add(result.of_light.emission, past), color_scale(color_add(glow, mist_light), of_ways + of_past));
     if (!KEEPS(s, STATE_LAYERS)) return result;
     result.of_light.albedo = color_add(color_add(layers.front, beside), result.of_light.albedo);
     result.of_light.normal = vec_pick(less(layers.nearest, (real)(REAL_LARGEST)), layers.normal, result.of_light.normal);

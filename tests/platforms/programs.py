@@ -63,8 +63,8 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
             yield f"show {to_image=}", show.program_text(to_image=to_image)
 
 
-# What none of the pictures has: exact normals of a grid, a grid along paths, clear glass, costly parts of materials, light
-# that water, balls and other shapes bend, and light that is sought.
+# What none of the pictures has: fog around the set, exact normals of a grid, a grid along paths, clear glass, costly parts
+# of materials, light that water, balls and other shapes bend, and light that is sought.
 _MORE: dict[str, dict[str, Any]] = {
     "exact": {"renderer": {"type": "volume", "normals": "exact"}},
     "lit": {
@@ -94,6 +94,7 @@ _MORE: dict[str, dict[str, Any]] = {
         "materials": {"glass": {"specular": {"roughness": 0}, "transmission": {"weight": 1}}},
         "objects": {"block": {"type": "box", "material": "glass"}},
     },
+    "mist": {"mist": {"by": "iterations"}},
     "sought": {
         "lighting": {"mode": "path"},
         "materials": {"embers": {"emission": {"luminance": {"by": "iterations"}}}},

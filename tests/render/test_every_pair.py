@@ -75,6 +75,7 @@ SECTIONS: dict[str, st.SearchStrategy[dict[str, Any]]] = {
     "renderer": st.builds(lambda count: {"samples": count, "min_samples": None}, st.integers(1, 3)),
     "fog": st.builds(lambda part: {"density": abs(part) / 4}, _NUMBERS),
     "glow": st.builds(lambda part: {"intensity": abs(part)}, _NUMBERS),
+    "mist": st.builds(lambda part: {"density": abs(part)}, _NUMBERS),
 }
 NEVER = {"surface": APART, "volume": OF_MEDIA, "cut_plane": frozenset()}
 CHOICES = [(kind, chosen) for kind, each in FEATURES.items() for chosen in covering(each, NEVER[kind])]
@@ -96,7 +97,9 @@ def read(scene: Mapping[str, Any]) -> Scene:
 def with_nothing(kind: str, scene: Mapping[str, Any]) -> dict[str, Any]:
     """A scene and what shines not or lets all light through: features that are switched off."""
     dark = {"type": "point", "position": [0, 9, 9], "intensity": 0}
-    off: dict[str, dict[str, Any]] = {"surface": {"fog": {"density": 0}, "glow": {"intensity": 0}}}
+    off: dict[str, dict[str, Any]] = {
+        "surface": {"fog": {"density": 0}, "glow": {"intensity": 0}, "mist": {"density": 0}}
+    }
     return {**off.get(kind, {}), **scene, "lights": [*scene.get("lights", [{}]), dark]}
 
 

@@ -47,6 +47,7 @@ FEATURES: dict[str, tuple[dict[str, Any], set[str]]] = {
     "thickness": ({"coloring": {"by": "thickness", "along": "view"}}, {"colors"}),
     "layer": ({"coloring": {"by": "layer_distance", "along": "reflection"}}, {"colors"}),
     "glow": ({"glow": {"by": "trap"}}, {"glow"}),
+    "mist": ({"mist": {"by": "iterations"}}, {"mist"}),
     "objects": ({"objects": {"ball": BALL, "sea": {"type": "water", "position": [0, 0, -2]}}}, {"objects"}),
     "cut": ({"cut_planes": [{"plane": PLANE, "cut": True}]}, {"planes"}),
     "quads": ({"cut_planes": [{"plane": PLANE}]}, {"planes"}),
@@ -155,7 +156,7 @@ JOINED: dict[str, dict[str, Any]] = {
     },
 }
 # Programs that know the formula, and whether anything is joined to it.
-OF_FORMULA = {"rays", "point_rays", "steps", "colors", "glow", "planes", "glass", "random_walk"}
+OF_FORMULA = {"rays", "point_rays", "steps", "colors", "glow", "mist", "planes", "glass", "random_walk"}
 
 
 def scene(formula: dict[str, Any] = FORMULA, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
@@ -241,6 +242,7 @@ KINDS: dict[str, list[dict[str, Any]]] = {
             "formula": {**FORMULA, "parameters": {"power": power}},
             "coloring": {"by": "trap", "trap": {"shape": "sphere"}},
             "glow": {"by": "trap"},
+            "mist": {"width": power / 100, "colors": [{"at": power, "color": [1, 1, 1]}]},
         }
         for power in POWERS
     ],
@@ -389,10 +391,11 @@ def test_stages_without_a_formula_are_the_same_for_all(device: Device) -> None:
         }
 
 
-# What asks the formula: rays, colours, a glow, planes.
+# What asks the formula: rays, colours, a glow, fog around the set, planes.
 ASKING: dict[str, Any] = {
     "coloring": {"by": "trap"},
     "glow": {"by": "trap"},
+    "mist": {"by": "iterations"},
     **FEATURES["quads"][0],
 }
 

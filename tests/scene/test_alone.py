@@ -31,6 +31,7 @@ materials: {m: {specular: {roughness: {by: §thickness}}}}
 => materials.m.specular.roughness.by: thickness needs a formula, and the scene's is none; use another quantity, or a
  texture
 glow: §{} => glow: needs a formula, and the scene's is none; remove it
+mist: §{} => mist: needs a formula, and the scene's is none; remove it
 lights: [{}, {type: §set}] => lights.1.type: set needs a formula, and the scene's is none; remove this light
 objects: {b: {}}
 cut_planes: [{opacity: 0, cut: true, objects: [b]}, {opacity: §0.5}]
@@ -137,6 +138,7 @@ FORMULAS = """objects:
   c: {join: cut, radius: 0.1}
 coloring: {by: trap}
 glow: {}
+mist: {by: iterations}
 """
 
 

@@ -33,6 +33,7 @@ objects:
     {type: volume, file: grid.npy, position: [0, 2, 0], transfer: {opacity: [{at: 0, opacity: 0}, {at: 1, opacity: 1}]}}
   skin: {type: volume, file: grid.npy, position: [0, -2, 0], level: 0.5}
 glow: {color: [1, 0.5, 0.1], trap: {shape: point}}
+mist: {by: iterations, density: 3, start: 2, end: 8, colors: [{at: 0, color: [1, 0.5, 0.1]}, {at: 4, color: [0.1, 0.2, 1]}]}
 stereo: {screen_width: 0.6, screen_distance: 0.6}
 lighting: {mode: path}
 """

@@ -140,6 +140,8 @@ renderer: {type: cut_plane}
 lights: [{type: §set, threshold: 1}] => lights.0.type: set is for surface renderers, got a cut_plane; remove this light
 renderer: {type: cut_plane}
 glow: §{} => glow: is for surface renderers, got a cut_plane; remove it
+renderer: {type: cut_plane}
+mist: §{} => mist: is for surface renderers, got a cut_plane; remove it
 fog: {height: 1, up: §[0, 0, 0]} => fog.up: must not be zero
 fog: {scattering: {anisotropy: §1}} => fog.scattering.anisotropy: must be at most 0.95, got 1
 lights: [{rays: §0}] => lights.0.rays: must be at least 1, got 0
@@ -159,6 +161,12 @@ environment: {name: a, rays: §-1} => environment.rays: must be at least 0, got 
 glow: {by: §nearness} => glow.by: must be closeness or trap, got 'nearness'
 glow: {§witdh: 1} => glow: unknown key 'witdh'; did you mean 'width'?
 glow: {width: §0} => glow.width: must be above 0, got 0
+mist: {by: §nearness} => mist.by: must be closeness or iterations, got 'nearness'
+mist: {§densty: 1} => mist: unknown key 'densty'; did you mean 'density'?
+mist: {by: iterations, start: 5, end: §4} => mist.end: must be above start, 5, got 4
+mist: {colors: §[]} => mist.colors: must not be empty
+mist: {colors: [{at: 1, color: [1, 1, 1]}, {at: §0.5, color: [1, 1, 1]}]}
+=> mist.colors.1.at: must be at least 1, the value at the stop before, got 0.5
 fog: {density: §-1} => fog.density: must be at least 0, got -1
 fog: {§colour: [1, 1, 1]} => fog: unknown key 'colour'; did you mean 'color'?
 # The lens.

@@ -175,6 +175,7 @@ STEPS: dict[str, st.SearchStrategy[Any]] = {
     "layout": st.sampled_from([None, {"views": [{}, {"renderer": {"type": "cut_plane"}}]}, {"views": []}]),
     "stereo": st.sampled_from([None, {"mode": "rows"}]),
     "glow": st.sampled_from([None, {"width": 0.1}, {"width": -1}]),
+    "mist": st.sampled_from([None, {"width": 0.1}, {"by": "iterations", "end": 1}]),
     "output.channels": st.sampled_from([["R", "G", "B"], ["Z"], ["albedo.R"], ["nothing"]]),
 }
 

@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from imgui_bundle import imgui
+
 from clfractal.scene.environment import names
 from clfractal.scene.light_paths import PathLighting
-from clfractal.viewer.panels import maps
+from clfractal.scene.mist import MAX_STOPS, Mist
+from clfractal.viewer.panels import maps, theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
 
@@ -51,7 +54,8 @@ def _lighting(ui: Ui) -> None:
 def summary(ui: Ui) -> str:
     """For the heading of the surroundings."""
     scene = ui.studio.scene
-    parts = [name for name, part in (("fog", scene.fog), ("glow", scene.glow)) if part is not None]
+    around = (("fog", scene.fog), ("glow", scene.glow), ("mist", scene.mist))
+    parts = [name for name, part in around if part is not None]
     light = scene.environment
     if light is not None:
         parts.insert(0, light.name or ("sky" if light.sky is not None else "map"))
@@ -71,8 +75,40 @@ def _glow(ui: Ui, radius: float) -> None:
     w.fields(ui, "glow.trap", glow.trap.used_keys)
 
 
+def _mist(ui: Ui, radius: float) -> None:
+    w.group(ui, "Mist")
+    if not w.optional(ui, "mist", "Mist", {}):
+        return
+    w.field(ui, "mist.by", "Dense by")
+    mist = ui.studio.scene.mist
+    assert mist is not None
+    by_count = mist.by == "iterations"
+    density = {"auto": "hides half", "start": float(f"{mist.used_density(radius):.2g}")}
+    width = {"auto": "1/20 of the bounds", "start": float(f"{radius / 20:.2g}")}
+    end = {"auto": "all iterations", "start": mist.used_end(ui.studio.scene.formula.iterations)}
+    keys = ("density", "start", "end") if by_count else ("density", "width", "distance")
+    w.fields(ui, "mist", keys, density=density, width=width, end=end)
+    for number in range(len(mist.colors)):
+        label = {"label": "At count" if by_count else "At distance"}
+        w.fields(ui, f"mist.colors.{number}", ("at", "color"), at=label)
+    if not w.filtering(ui):
+        _stop_buttons(ui, mist, 1.0 if by_count else mist.used_width(radius))
+
+
+def _stop_buttons(ui: Ui, mist: Mist, step: float) -> None:
+    """For one colour more, which begins as the last one a step farther, or one less."""
+    stops = [w.plain(stop) for stop in mist.colors]
+    w.in_labels()
+    if w.button("Add a colour", icon=theme.PLUS, enabled=len(stops) < MAX_STOPS):
+        farther = {**stops[-1], "at": float(f"{stops[-1]['at'] + step:.4g}")}
+        w.put(ui, "mist.colors", [*stops, farther])
+    imgui.same_line()
+    if w.button("Remove the last", icon=theme.MINUS, enabled=len(stops) > 1):
+        w.put(ui, "mist.colors", stops[:-1])
+
+
 def draw_surroundings(ui: Ui) -> None:
-    """Draws background, fog, glow and environment."""
+    """Draws background, fog, glow, mist and environment."""
     w.group(ui, "Background")
     _background(ui)
     w.group(ui, "Fog")
@@ -88,6 +124,7 @@ def draw_surroundings(ui: Ui) -> None:
         if w.optional(ui, "fog.scattering", "Shafts", {}):
             w.fields(ui, "fog.scattering", ("color", "anisotropy"))
     _glow(ui, radius)
+    _mist(ui, radius)
     w.group(ui, "Environment")
     if w.optional(ui, "environment", "Environment", {"name": names()[0]}):
         _map(ui)
