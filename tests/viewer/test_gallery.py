@@ -138,7 +138,7 @@ def test_a_changed_scene_gets_a_new_picture(tmp_path: Path) -> None:
     path = tmp_path / "scene.yaml"
     shutil.copy(SCENE, path)
     before = shelf([path]).entries[0].key
-    path.write_text(path.read_text().replace("fov: 56", "fov: 55"))
+    path.write_text(path.read_text().replace("fov: 46", "fov: 45"))
     assert shelf([path]).entries[0].key != before
 
 
