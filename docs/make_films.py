@@ -24,6 +24,7 @@ from clfractal.engine.frames import frames
 from clfractal.files import resources
 from clfractal.files.srgb import encode8
 from clfractal.scene.model import Scene
+from clfractal.scene.volume import VolumeRenderer
 
 DOCS = Path(__file__).resolve().parent
 PICTURES = DOCS / "pictures"
@@ -33,6 +34,7 @@ REDUCED = (1, 5 / 6, 2 / 3)  # parts of these sizes
 STEP = 2  # frames of the scene for one of the film
 LARGEST_FILE = 1_200_000  # bytes: eight films stay below 10 MB
 QUALITIES = range(40, 91)  # of WebP
+VOXELS = 383  # along the longest side of a volume, at most: more are for stills
 
 
 def film_paths() -> list[Path]:
@@ -49,8 +51,12 @@ def film_of(name: str) -> Path:
 
 def small_scene(path: Path) -> Scene:
     """The scene at the size of its small film."""
-    width, height = EYE_SIZE if load_scene(path).stereo is not None else SIZE
-    return load_scene(path, overrides=[f"image.width={width}", f"image.height={height}"])
+    scene = load_scene(path)
+    width, height = EYE_SIZE if scene.stereo is not None else SIZE
+    overrides = [f"image.width={width}", f"image.height={height}"]
+    if isinstance(scene.renderer, VolumeRenderer) and isinstance(scene.renderer.resolution, int):
+        overrides.append(f"renderer.resolution={min(scene.renderer.resolution, VOXELS)}")
+    return load_scene(path, overrides=overrides)
 
 
 def frames_of(scene: Scene) -> Iterator[Floats]:
