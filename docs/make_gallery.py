@@ -88,6 +88,7 @@ FIRST = (
     "basalt_cave",
     "peaks",
     "lamp_room",
+    "sculpture_court",
     "baths",
     "chapel",
     "stepwell",
