@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from clfractal.exchange.mists import mist_of
 from clfractal.exchange.settings import Section, Settings
 
 Look = Literal["same", "ours"]
@@ -62,6 +63,7 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
     for key, section in (
         ("fog", _fog(main, screen, found["background"])),
         ("glow", _glow(main, camera, screen)),
+        ("mist", mist_of(main, screen.color, _behind(found), remarks)),
         ("objects", _limits(main)),
         ("output", _output(main, screen, remarks)),
     ):
@@ -285,10 +287,6 @@ def _fog(main: Section, screen: Screen, background: dict[str, Any]) -> dict[str,
     """Fog on the way to the surface, and to where they look no farther: what is behind it is mixed with its colour here."""
     color = main.color("basic_fog_color", (0xE807, 0xEF12, 0xFFFF))
     visibility = main.number("basic_fog_visibility", 20.0)
-    if not main.flag("volumetric_fog_enabled", False):
-        main.without((*main.beginning("volumetric_fog_"), "fog_color_1", "fog_color_2", "fog_color_3"))
-    if not main.flag("iteration_fog_enable", False):
-        main.without(main.beginning("iteration_fog_"))
     if not main.flag("basic_fog_enabled", False) or visibility <= 0:
         return None
     through = math.exp(-max(main.number("view_distance_max", 50.0), 0.0) / visibility)
@@ -296,6 +294,11 @@ def _fog(main: Section, screen: Screen, background: dict[str, Any]) -> dict[str,
     for side, seen in background.items():
         background[side] = [round(through * a + (1 - through) * b, 6) for a, b in zip(seen, own, strict=True)]
     return {"color": own, "density": float(f"{min(1 / visibility, _LARGEST):.6g}"), "background": False}
+
+
+def _behind(found: dict[str, Any]) -> list[float]:
+    """About what is seen through fog around the set, linear: what is behind the set, as that is in fog's own light."""
+    return [sum(pair) / 2 for pair in zip(*found["background"].values(), strict=True)]
 
 
 def _glow(main: Section, camera: dict[str, Any], screen: Screen) -> dict[str, Any] | None:
@@ -353,3 +356,4 @@ def _lit_by_ours(found: dict[str, Any]) -> None:
     found["renderer"] = {"samples": 64}
     found["output"] = {**found.get("output", {}), "tone": "agx"}
     found.pop("glow", None)
+    found.pop("mist", None)

@@ -12,6 +12,7 @@ from clfractal.exchange.colors import coloring_of
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
 from clfractal.exchange.measure import are_inside, ball_of
+from clfractal.exchange.mists import move_counts
 from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around, placing_of
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
@@ -166,6 +167,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     if is_mirrored(settings):
         mirror(scene)
     _hollow_out(scene, settings, installed)
+    move_counts(scene)
     _leave_out_lamps(scene, remarks)
     _end_rays(scene, settings.main)
     coloring = coloring_of(settings, remarks, _folds_of(scene["formula"]))

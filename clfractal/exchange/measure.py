@@ -85,6 +85,33 @@ def ball_of(section: dict[str, Any]) -> tuple[tuple[float, ...], float]:
     return chain.center, chain.radius
 
 
+POWER_BAILOUT, FOLD_BAILOUT = 10.0, 100.0
+"""Beyond which their orbits end of what grows by a power, and by a factor, where a file gives nothing of its own."""
+
+
+def counts_apart(section: dict[str, Any]) -> float:
+    """By how much our smooth escape counts of a scene's section `formula` are larger than their whole ones, in the mean.
+
+    Theirs end at a smaller radius. Applications from the one to the other are counted from places around the set.
+    """
+    import numpy as np
+
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import escape
+
+    chain, limit = resolve(section), int(section["iterations"])
+    far, near = chain.distance_bailout, POWER_BAILOUT if chain.degree > 1 else FOLD_BAILOUT
+    places = np.random.default_rng(1).uniform(-1, 1, (2000, 3)) * min(chain.radius, 1e6) + chain.center
+    with np.errstate(all="ignore"):
+        (ours, inside), (theirs, _) = (
+            escape(resolve({**section, "bailout": radius, "distance_bailout": radius}), places, limit)
+            for radius in (far, near)
+        )
+    known = ~inside & (theirs > 0) & (ours < limit)
+    apart = float((ours - theirs)[known].mean()) if known.any() else 0.0
+    return apart - 0.5
+
+
 def _member(link: dict[str, Any]) -> dict[str, Any]:
     return {
         "inline": link["formula"],

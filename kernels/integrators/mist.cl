@@ -30,9 +30,11 @@ INLINE real mist_at(vec point, mask active, real *quantity, real *scale, counter
         density *= share * share;
     } else {
         here = orbit_distance(point, active, orbit, k);
-        *quantity = here.step;
-        const real width = (real)(m->mist_width);
-        const real away = fmin(fabs(here.step - (real)(m->mist_distance)) / width, MIST_FARTHEST);
+        // Estimates are made for near the set: far out they may be a half of the distance, but the bounds are not that far.
+        const vec arm = vec_sub(point, vec_splat(w.settings->bounds_center));
+        const real width = (real)(m->mist_width), beyond = sqrt(vec_dot(arm, arm)) - (real)(w.settings->bounds_radius);
+        *quantity = fmax(here.step, beyond);
+        const real away = fmin(fabs(*quantity - (real)(m->mist_distance)) / width, MIST_FARTHEST);
         const real square = R(1.0) + away * away;
         *scale = width * sqrt(square);
         density /= square;

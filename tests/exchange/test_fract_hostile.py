@@ -30,6 +30,9 @@ WORDS = (
 CAMERA = "camera 3 -6 2;\ntarget 0 0 0;\ncamera_top 0 0 1;\nfov 1;"
 LIGHT = (
     "limits_enabled true;\nbasic_fog_enabled true;\nmat1_surface_color_gradient 0 ff0000 5000 00ff00;\n"
+    "iteration_fog_enable true;\niteration_fog_opacity 3;\niteration_fog_opacity_trim 2;\n"
+    "iteration_fog_color_1_maxiter 4;\n"
+    "volumetric_fog_enabled true;\nvolumetric_fog_distance_factor 0.1;\nvolumetric_fog_colour_1_distance 0.2;\n"
     "aux_light_enabled_1 true;\nmain_light_alpha 10;\nbackground_color_1 0 0 ffff;"
 )
 FILES = (

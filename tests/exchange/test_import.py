@@ -260,6 +260,56 @@ class TestScenes:
         assert scene["background"]["top"] == pytest.approx([1 - math.exp(-1), 0, 0], abs=1e-5)
         assert scene["fog"]["background"] is False
 
+    def test_fog_around_the_set(self) -> None:
+        """What pictures of theirs show of a plane, a ball and counts that are known (`docs/import.md`)."""
+        keys = (
+            "volumetric_fog_enabled true;\nvolumetric_fog_density 2;\nvolumetric_fog_distance_factor 0.1;\n"
+            "volumetric_fog_distance_from_surface 0.3;\nvolumetric_fog_colour_1_distance 0.5;\n"
+            "volumetric_fog_colour_2_distance 1;\nfog_color_1 ffff 0 0;\nfog_color_2 0 ffff 0;\nfog_color_3 0 0 ffff;\n"
+        )
+        black = "".join(f"background_color_{number} 0 0 0;\n" for number in (1, 2, 3))
+        scene = imported(f"{CAMERA}\n{black}{keys}").scene
+        mist = load_scene(scene).mist
+        assert mist is not None
+        assert (mist.by, mist.width, mist.distance) == ("closeness", 0.1, 0.3)
+        # Seen at distances of 0.25, 0.5 and 1 over a plane, as parts of the screen's white.
+        for at, seen in (
+            (0, (1, 0, 0)),
+            (0.25, (0.4375, 0.4375, 0.125)),
+            (0.5, (0, 0.5, 0.5)),
+            (1, (0, 0, 1)),
+        ):
+            (stop,) = (each for each in mist.colors if each.at == at)
+            linear = [part / 12.92 if part <= 0.04045 else ((part + 0.055) / 1.055) ** 2.4 for part in seen]
+            assert stop.color == pytest.approx(linear, abs=1e-5)
+        # A way straight down has 0.3 * 2 * pi / 2 of theirs; as bright as theirs where fog of one colour is before black.
+        even = "".join(f"fog_color_{number} ffff ffff ffff;\n" for number in (1, 2, 3))
+        mist = load_scene(imported(f"{CAMERA}\n{black}{keys}{even}").scene).mist
+        assert mist is not None
+        assert mist.density is not None
+        shown = (1 - math.exp(-mist.density * 0.1 * math.pi / 2)) ** (1 / 2.2)
+        assert shown == pytest.approx(1 - math.exp(-0.3 * math.pi), rel=1e-4)
+        assert "mist" not in imported(f"{CAMERA}\n{black}{keys}", look="ours").scene
+
+    def test_fog_by_iterations(self) -> None:
+        """Their counts end at 10 of a power, ours at another radius; squares of a ball get there log2(log ratio) later."""
+        keys = "formula_1 2;\njulia_mode true;\njulia_c 0 0 0;\nN 20;\niteration_fog_enable true;\n"
+        keys += "iteration_fog_opacity 4;\niteration_fog_opacity_trim 5;\niteration_fog_color_1 ffff 0 0;\n"
+        found = imported(f"{CAMERA}\n{keys}", "power 2;")
+        scene = load_scene(found.scene)
+        assert scene.mist is not None
+        later = math.log2(math.log(scene.chain.distance_bailout) / math.log(10)) - 0.5
+        # (By random places.)
+        assert scene.mist.start == pytest.approx(5 + later, abs=0.1)
+        assert scene.mist.end == pytest.approx(20 + later, abs=0.1)
+        assert [stop.at for stop in scene.mist.colors] == pytest.approx(
+            [5 + later, 8 + later, 12 + later], abs=0.1
+        )
+        assert found.remarks == ()
+        both = imported(f"{CAMERA}\n{keys}volumetric_fog_enabled true;", "power 2;")
+        assert both.scene["mist"].get("by") is None
+        assert both.remarks == ("iteration_fog_enable: there is fog by distances already",)
+
     def test_light_from_everywhere(self) -> None:
         occluded = "ambient_occlusion_enabled true;\nambient_occlusion 0.8;\ncamera_distance_to_target 1;"
         scene = imported(f"{CAMERA}\n{occluded}").scene
@@ -296,16 +346,16 @@ class TestScenes:
 
     def test_everything_else_is_told(self) -> None:
         keys = (
-            "iteration_fog_enable true;\niteration_fog_opacity 3;\nstereo_enabled true;\nflight_speed 2;\n"
+            "DE_delta 1;\nclouds_density 3;\nstereo_enabled true;\nflight_speed 2;\n"
             "DE_factor 0.5;\nnever_seen 1;"
         )
         found = imported(f"{CAMERA}\nfractal_constant_factor 1 1 1;\n{keys}\nperspective_type 2;")
         assert found.remarks == (
             "perspective_type: equirectangular is not there yet; the picture is in perspective",
-            "line 13: iteration_fog_opacity = 3 is not taken over",
+            "line 13: clouds_density = 3 is not taken over",
             "line 14: stereo_enabled = true is not taken over",
             "line 17: never_seen = 1 is not taken over",
-            "1 key of how their rays find the surface: ours find it by themselves",
+            "2 keys of how their rays find the surface: ours find it by themselves",
             "1 key of windows, films and files: not a part of the picture",
         )
 
