@@ -78,6 +78,7 @@ FIRST = (
     "lantern_bay",
     "fractal_tree",
     "jerusalem_cube",
+    "sponge_harbour",
     "cistern",
     "dew",
     "sunken_temple",
