@@ -30,10 +30,12 @@ INLINE real mist_at(vec point, mask active, real *quantity, real *scale, counter
         density *= share * share;
     } else {
         here = orbit_distance(point, active, orbit, k);
-        // Estimates are made for near the set: far out they may be a half of the distance, but the bounds are not that far.
+        // Estimates are made for near the set, and far out may be a half of the distance, which is no less than that from the bounds.
+        // This takes over little by little, or the fog would show how round these are.
         const vec arm = vec_sub(point, vec_splat(w.settings->bounds_center));
-        const real width = (real)(m->mist_width), beyond = sqrt(vec_dot(arm, arm)) - (real)(w.settings->bounds_radius);
-        *quantity = fmax(here.step, beyond);
+        const real width = (real)(m->mist_width), radius = (real)(w.settings->bounds_radius), beyond = sqrt(vec_dot(arm, arm)) - radius;
+        const real outside = bounded(beyond / radius, R(0.0), R(1.0));
+        *quantity = here.step + outside * fmax(beyond - here.step, R(0.0));
         const real away = fmin(fabs(*quantity - (real)(m->mist_distance)) / width, MIST_FARTHEST);
         const real square = R(1.0) + away * away;
         *scale = width * sqrt(square);

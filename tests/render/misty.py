@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.formulas import reference
 from clfractal.scene.model import Scene
 from tests.render.shots import PERSPECTIVE, Floats, rays, to_sphere
 from tests.scenes import scene_of
@@ -99,6 +100,13 @@ def _fog(scene: Scene, away: Floats, radius: float) -> tuple[Floats, Floats]:
     dense = mist.used_density(scene.bounds[1])
     if mist.by == "closeness":
         distance = np.maximum(away - radius, 0)
+        if scene.chain.shape_index is None:
+            # The formula's estimate; within one radius of the bounds the distance from these takes over.
+            bounds = scene.bounds[1]
+            points = np.stack([away, 0 * away, 0 * away], axis=1)
+            estimate = reference.distance(scene.chain, points, scene.formula.iterations)[0]
+            part = np.clip((away - bounds) / bounds, 0, 1)
+            distance = estimate + part * np.maximum(away - bounds - estimate, 0)
         return distance, dense / (1 + ((distance - mist.distance) / mist.used_width(scene.bounds[1])) ** 2)
     count = np.log2(np.log(scene.chain.distance_bailout) / np.log(away))
     end = mist.used_end(scene.formula.iterations)

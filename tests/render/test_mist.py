@@ -27,6 +27,7 @@ CASES: dict[str, dict[str, Any]] = {
     "parallel": {"mist": MIST, "camera": ORTHOGRAPHIC},
     "in fog": {"mist": {**MIST, "density": 4}, "fog": {"density": 0.3, "color": [0.9, 0.2, 0.5]}},
     "paths": {"mist": MIST, "lighting": {"mode": "path", "bounces": 1}},
+    "far out": {"mist": {**MIST, "density": 0.4, "width": 0.8}, "formula": SQUARES, "iterations": 9},
     "counts": {"mist": BY_COUNTS, "formula": SQUARES, "iterations": 9},
     "the formula's counts": {
         "mist": {"by": "iterations", "start": 0.5, "density": 40, "colors": COUNTS},
