@@ -258,6 +258,19 @@ def test_a_sphereflake_is_its_balls() -> None:
     assert np.median((got / exact)[outside]) > 0.9
 
 
+def test_a_sphereflake_is_not_where_the_bounds_of_its_flakes_touch() -> None:
+    middles, radii = np.array([m for m, _ in flake(2)]), np.array([r for _, r in flake(2)])
+    largest = middles[np.isclose(radii, 1 / 3)]
+    between = (largest[:, None] + largest) / 2
+    touching = between[np.isclose(np.linalg.norm(largest[:, None] - largest, axis=2), 4 / 3)]
+    assert len(touching) == 2 * 15
+    p = np.concatenate([touching, *(touching + 0.05 * step for step in points(200, 1))])
+    exact = np.min(np.linalg.norm(p[:, None] - middles, axis=2) - radii, axis=1)
+    assert (exact > 0.05).all()
+    got = own_distance(chain_of("sphereflake"), p, 2)
+    assert (got / exact).min() > 0.3
+
+
 def soddy(levels: int) -> list[tuple[Floats, float]]:
     """Balls of the packing by Soddy's theorem: of five that touch each other any one has another in its place.
 
