@@ -77,6 +77,8 @@ def is_figure(scene: Path) -> bool:
 FIRST = (
     "lantern_bay",
     "fractal_tree",
+    "golden_island",
+    "clay_city",
     "jerusalem_cube",
     "sponge_harbour",
     "cistern",

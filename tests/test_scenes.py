@@ -127,7 +127,7 @@ def test_the_whole_library_is_shown_by_scenes_or_portraits() -> None:
     for path in SCENES:
         formula = clfractal.load_scene(path).formula
         used |= {formula.name} | {link.name for link in formula.chain or ()}
-    assert len(used & set(catalog.names())) >= 37
+    assert len(used & set(catalog.names())) >= 41
     assert set(catalog.names()) - used <= set(maker("make_portraits").names())
 
 
