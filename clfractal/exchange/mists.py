@@ -42,7 +42,7 @@ def mist_of(
         colors = found["colors"]
         usual = colors[len(colors) // 2]["color"]
         thickness = math.pi / 2 * found["density"] * found["width"] if near is not None else math.log(2)
-        found["density"] = _rounded(found["density"] * denser(usual, behind, thickness))
+        found["density"] = _rounded(min(found["density"] * denser(usual, behind, thickness), _LARGEST))
     return found
 
 

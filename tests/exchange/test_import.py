@@ -290,6 +290,13 @@ class TestScenes:
         shown = (1 - math.exp(-mist.density * 0.1 * math.pi / 2)) ** (1 / 2.2)
         assert shown == pytest.approx(1 - math.exp(-0.3 * math.pi), rel=1e-4)
         assert "mist" not in imported(f"{CAMERA}\n{black}{keys}", look="ours").scene
+        # Dark fog before white would have to be denser than anything may be.
+        thick = f"{CAMERA}\nvolumetric_fog_enabled true;\nvolumetric_fog_density 1000000;\n"
+        thick += "volumetric_fog_distance_factor 0.5;\nbackground_3_colors_enable false;\n"
+        dark = "".join(f"fog_color_{number} 0 0 0;\n" for number in (1, 2, 3))
+        most = load_scene(imported(f"{thick}{dark}background_color_1 ffff ffff ffff;").scene).mist
+        assert most is not None
+        assert most.density == 1e6
 
     def test_fog_by_iterations(self) -> None:
         """Their counts end at 10 of a power, ours at another radius; squares of a ball get there log2(log ratio) later."""
