@@ -91,6 +91,7 @@ FIRST = (
     "basalt_cave",
     "peaks",
     "lamp_room",
+    "lamp_of_cells",
     "sculpture_court",
     "baths",
     "chapel",
