@@ -50,7 +50,7 @@ have a page of their own. To make one at full size, and to see it from the other
 
 ```console
 clfractal render scenes/mandelbulb.yaml -o bulb.png
-clfractal render scenes/mandelbulb.yaml -o other_side.png --set 'camera.position=[-0.82, 0.98, 2.05]'
+clfractal render scenes/mandelbulb.yaml -o other_side.png --set 'camera.position=[-0.7, 0.84, 2.8]'
 ```
 
 The words are those of the scene files; `python docs/make_gallery.py` makes the pictures and both pages anew.
