@@ -86,7 +86,7 @@ FILLED = (
     *("menger_hall", "museum", "riemann_sphere", "studio_julia", "wet_street", "three_trees"),
     *("twisted_box", "lamp_room", "lamplit_shells", "amazing_box_vary", "glass_marbles", "star_cut"),
     *("aexion", "cosine_mandelbulb", "stereo_bulb", "stereo_hast"),
-    *("turned_chain", "surf_bay", "honeycomb_lamp", "mandelbox_hall", "lamp_of_cells"),
+    *("turned_chain", "surf_bay", "honeycomb_lamp", "lamp_of_cells"),
 )
 
 # By module: all tests of one scene come together, and in one process, which renders it once.
