@@ -116,8 +116,8 @@ def test_the_issue_of_the_thesis(device: Device) -> None:
         if point_inside(chain, device, columns[c], rows[r], points[r, c, 2], height / side) is None:
             empty[f"{columns[c[0]]}, {rows[r[0]]}"] = len(c)
     # Which pixels are hit falsely follows from the last bits of a distance, and so from the processor's estimate of
-    # 1/sqrt: Intel's leaves no such island here, AMD's four, of seven pixels of 270,000.
-    assert sum(empty.values()) <= 5e-5 * covered.sum(), empty
+    # 1/sqrt: AMD's leaves four such islands here, of seven pixels of 270,000, Intel's none, or ten of eighteen.
+    assert sum(empty.values()) <= 1e-4 * covered.sum(), empty
 
 
 @pytest.mark.parametrize(("x", "side"), [(-0.6, 900), (-0.75, 900), (-0.6, 333)])

@@ -323,14 +323,14 @@ def test_tab_goes_to_the_next_number() -> None:
 @pytest.mark.parametrize("how", ["label", "dot"])
 def test_the_default_comes_back(how: str) -> None:
     stage = stage_of("material.ambient")
-    assert stage.ui.studio.scene.material.ambient == 0.02
+    assert stage.ui.studio.scene.material.ambient == 0.002
     if how == "label":
         stage.double_click(*LABEL)
     else:
         stage.click(*DOT)
     assert stage.ui.studio.scene.material.ambient == 0.1
     assert stage.ui.studio.undo("scene")
-    assert stage.ui.studio.scene.material.ambient == 0.02
+    assert stage.ui.studio.scene.material.ambient == 0.002
 
 
 def test_optional_values_are_switched_on_and_off() -> None:

@@ -313,7 +313,7 @@ def field(
         unit, factor, step, usual: see `Scale`, in the place of what the schema tells.
         start: for one that may be null (or a word), its first value when it is set.
         auto: shown where it is null (or that word).
-        segmented: choices side by side instead of in a list.
+        segmented: choices side by side instead of in a list, as two always are.
         words: other words for choices.
         keep: values at other paths that are set along with this one.
     """
@@ -441,7 +441,7 @@ def _flag(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: 
 
 def _choice(ui: Ui, path: str, target: Target, meta: Meta, width: float, options: Options) -> None:
     words = {each: options["words"].get(each, word(str(each))) for each in meta.choices}
-    show = segments if options["segmented"] else choose
+    show = segments if options["segmented"] or len(words) <= 2 else choose
     found = show(path, words, target.value, width)
     if found is not None:
         ui.studio.edit({**options["keep"], path: found})
