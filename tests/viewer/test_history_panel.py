@@ -63,7 +63,7 @@ def test_steps_are_told_in_words() -> None:
     camera = ui.studio.value("camera")
     told: dict[str, dict[str, Any]] = {
         "Lights 1: intensity 2.5": {"lights.0.intensity": 2.5},
-        "Lights 3: shadow on": {"lights.2.shadow": True},
+        "Lights 4: shadow on": {"lights.3.shadow": True},
         "Formula: power 7": {"formula.parameters.power": 7},
         "Renderer: search steps": {"renderer.search": "steps"},
         "Output: exposure \u22120.5": {"output.exposure": -0.5},
