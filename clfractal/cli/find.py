@@ -87,13 +87,13 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
         check_suitable(scene)
     size = (sized.image.width, sized.image.height) if order.size is not None else small_size(scene)
     moved = Moved(Path(order.scene), scene, choice.folder, "views")
+    shell.state = lambda: "clfractal: interrupted; nothing was written"
     names = choice.names(Path(order.scene))
     _check_files(scene, choice, names, order.scene)
     # Imported only now: mistakes in the input are reported without waiting for OpenCL.
     from clfractal.engine.engine import Engine
 
     pictures: list[Pixels] = []
-    shell.state = lambda: "clfractal: interrupted; nothing was written"
     with choice.folder_made(), Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
         found = found_views(scene, engine, count=choice.count, seed=choice.seed)
 
