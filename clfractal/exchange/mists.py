@@ -141,7 +141,6 @@ def _counted(
     if any(main.flag(f"aux_light_enabled_{number}", False) for number in range(1, 5)):
         lit += _LAMPS
     bright = max(lit, 0.0) * (_SHADED if main.flag("iteration_fog_shadows", True) else _LIT)
-    main.number("iteration_fog_brightness_boost", 1.0)
     if opacity <= 0 or start >= most:
         return None
     start = max(start, 0.0)

@@ -8,34 +8,14 @@ import numpy as np
 
 from clfractal.formulas import reference
 from clfractal.scene.model import Scene
-from tests.render.shots import PERSPECTIVE, Floats, rays, to_sphere
+from tests.render.shots import PERSPECTIVE, SOLID_RADIUS, SOLID_SPHERE, Floats, rays, to_sphere
 from tests.scenes import scene_of
 
 SIDE = 32
-RADIUS = 0.8
 BEHIND, SURFACE = np.array([0.6, 0.5, 0.4]), np.array([0.2, 0.7, 0.3])
-# A map that does nothing, and a solid whose distance is known.
-SPHERE: dict[str, Any] = {
-    "variables": ["x", "y", "z"],
-    "map": ["x", "y", "z"],
-    "add": "none",
-    "degree": 1,
-    "shape": f"sqrt(x*x + y*y + z*z) - {RADIUS}",
-    "bounds": {"center": [0, 0, 0], "radius": 1},
-    "bailout": 30,
-}
-# Its smooth escape counts are known: each application squares the distance from the middle.
-SQUARES: dict[str, Any] = {
-    "variables": ["x", "y", "z"],
-    "map": ["x*x - y*y - z*z", "2*x*y", "2*x*z"],
-    "add": "none",
-    "degree": 2,
-    "bounds": {"center": [0, 0, 0], "radius": 1.5},
-    "bailout": 4,
-}
 
 
-def misty(samples: int, formula: dict[str, Any] = SPHERE, **sections: Any) -> Scene:
+def misty(samples: int, formula: dict[str, Any] = SOLID_SPHERE, **sections: Any) -> Scene:
     """A ball that shines evenly, in fog around it."""
     paths = sections.get("lighting", {}).get("mode") == "path"
     black = {"color": [0, 0, 0], "ambient": 0, "diffuse": 0, "specular": 0}
@@ -115,7 +95,7 @@ def _fog(scene: Scene, away: Floats, radius: float) -> tuple[Floats, Floats]:
 
 def ball_radius(scene: Scene) -> float:
     """Of the solid, by its formula."""
-    return RADIUS if scene.chain.shape_index is not None else 4.0 ** (2.0**-scene.formula.iterations)
+    return SOLID_RADIUS if scene.chain.shape_index is not None else 4.0 ** (2.0**-scene.formula.iterations)
 
 
 def sure(scene: Scene) -> Any:

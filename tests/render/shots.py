@@ -53,6 +53,17 @@ BALL: dict[str, Any] = {
     "bounds": {"center": [0, 0, 0], "radius": 1.5},
     "bailout": 4,
 }
+# A map that does nothing, and a solid whose distance is known.
+SOLID_RADIUS = 0.8
+SOLID_SPHERE: dict[str, Any] = {
+    "variables": ["x", "y", "z"],
+    "map": ["x", "y", "z"],
+    "add": "none",
+    "degree": 1,
+    "shape": f"sqrt(x*x + y*y + z*z) - {SOLID_RADIUS}",
+    "bounds": {"center": [0, 0, 0], "radius": 1},
+    "bailout": 30,
+}
 # With a scalar derivative the march takes its other way, without the proof of hits.
 QUICK_BALL = {**BALL, "derivative": "2*sqrt(x*x + y*y + z*z)*dr"}
 # A box with its top at z = 0 and a sphere that hovers over it, as the last solid of a map that does nothing.

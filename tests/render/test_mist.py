@@ -10,8 +10,8 @@ import pytest
 from clfractal.device.select import Device
 from clfractal.scene.model import Scene
 from tests.render.bits import alike_by_lanes
-from tests.render.misty import BEHIND, SQUARES, expected, misty, sure
-from tests.render.shots import ORTHOGRAPHIC, rays, shoot, stacked, to_sphere
+from tests.render.misty import BEHIND, expected, misty, sure
+from tests.render.shots import BALL, ORTHOGRAPHIC, rays, shoot, stacked, to_sphere
 from tests.variants import every
 
 RED, GREEN, BLUE = [1.0, 0.1, 0.05], [0.1, 0.9, 0.2], [0.05, 0.2, 1.0]
@@ -28,11 +28,11 @@ CASES: dict[str, dict[str, Any]] = {
     "parallel": {"mist": MIST, "camera": ORTHOGRAPHIC},
     "in fog": {"mist": {**MIST, "density": 4}, "fog": {"density": 0.3, "color": [0.9, 0.2, 0.5]}},
     "paths": {"mist": MIST, "lighting": {"mode": "path", "bounces": 1}},
-    "far out": {"mist": {**MIST, "density": 0.4, "width": 0.8}, "formula": SQUARES, "iterations": 9},
-    "counts": {"mist": BY_COUNTS, "formula": SQUARES, "iterations": 9},
+    "far out": {"mist": {**MIST, "density": 0.4, "width": 0.8}, "formula": BALL, "iterations": 9},
+    "counts": {"mist": BY_COUNTS, "formula": BALL, "iterations": 9},
     "the formula's counts": {
         "mist": {"by": "iterations", "start": 0.5, "density": 40, "colors": COUNTS},
-        "formula": SQUARES,
+        "formula": BALL,
         "iterations": 6,
     },
 }
@@ -105,7 +105,7 @@ def test_its_light_is_emission(device: Device) -> None:
 
 @pytest.mark.parametrize(
     "sections",
-    [{"mist": MIST}, {"mist": {**BY_COUNTS, "start": 4.2}, "formula": SQUARES, "iterations": 9}],
+    [{"mist": MIST}, {"mist": {**BY_COUNTS, "start": 4.2}, "formula": BALL, "iterations": 9}],
     ids=["distances", "counts"],
 )
 def test_joined_solids_have_one_mist(device: Device, sections: dict[str, Any]) -> None:

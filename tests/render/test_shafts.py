@@ -18,6 +18,8 @@ from tests.render.shots import (
     ORTHOGRAPHIC,
     PERSPECTIVE,
     QUICK_BALL,
+    SOLID_RADIUS,
+    SOLID_SPHERE,
     Floats,
     rays,
     shoot,
@@ -172,26 +174,15 @@ def test_a_soft_light_has_soft_shafts(device: Device) -> None:
     np.testing.assert_allclose(hard, soft, rtol=1e-4)
 
 
-RADIUS = 0.8
 COLOR = np.array([1.0, 0.5, 0.25])
 BLACK = {"color": [0, 0, 0], "ambient": 0, "diffuse": 0, "specular": 0}
-# A map that does nothing, and a solid whose distance is known.
-SPHERE: dict[str, Any] = {
-    "variables": ["x", "y", "z"],
-    "map": ["x", "y", "z"],
-    "add": "none",
-    "degree": 1,
-    "shape": f"sqrt(x*x + y*y + z*z) - {RADIUS}",
-    "bounds": {"center": [0, 0, 0], "radius": 1},
-    "bailout": 30,
-}
 
 
 def glowing(samples: int, camera: dict[str, Any] = PERSPECTIVE, **sections: Any) -> Scene:
     """A black ball before black, so that only the glow is seen."""
     glow = {"color": COLOR.tolist(), "intensity": 0.7, "width": 0.15, **sections.pop("glow", {})}
     return scene_of(
-        SPHERE,
+        SOLID_SPHERE,
         camera,
         (SIDE, SIDE),
         lights=[],
@@ -208,15 +199,15 @@ def places(scene: Scene, parts: int = 4000) -> tuple[Floats, Floats, Any]:
     origin = np.broadcast_to(origin, way.shape)
     t = (np.arange(parts) + 0.5) * (8 / parts)
     points = origin[..., None, :] + t[:, None] * way[..., None, :]
-    distance, nearest = to_sphere(origin, way, [0, 0, 0], RADIUS)
-    far = np.where(nearest < RADIUS, distance, 8.0)
+    distance, nearest = to_sphere(origin, way, [0, 0, 0], SOLID_RADIUS)
+    far = np.where(nearest < SOLID_RADIUS, distance, 8.0)
     return points, np.full(t.shape, 8 / parts), t < far[..., None]
 
 
 def glow_of(scene: Scene) -> Floats:
     glow: Any = scene.glow
     points, step, free = places(scene)
-    distance = np.maximum(np.linalg.norm(points, axis=-1) - RADIUS, 0)
+    distance = np.maximum(np.linalg.norm(points, axis=-1) - SOLID_RADIUS, 0)
     bright = np.exp(-distance / glow.width) * free
     if glow.by == "trap":
         # The orbit stays where it began.
@@ -230,8 +221,8 @@ def glow_of(scene: Scene) -> Floats:
 def sure(scene: Scene) -> Any:
     """Pixels without the ball's rim."""
     origin, way, _ = rays(scene)
-    _, nearest = to_sphere(np.broadcast_to(origin, way.shape), way, [0, 0, 0], RADIUS)
-    return (nearest < 0.9 * RADIUS) | (nearest > 1.1 * RADIUS)
+    _, nearest = to_sphere(np.broadcast_to(origin, way.shape), way, [0, 0, 0], SOLID_RADIUS)
+    return (nearest < 0.9 * SOLID_RADIUS) | (nearest > 1.1 * SOLID_RADIUS)
 
 
 PLANE_TRAP = {"by": "trap", "reach": 0.3, "trap": {"shape": "plane", "center": [0, 0, 0.5]}}

@@ -120,7 +120,7 @@ def _search(ui: Ui, renderer: SurfaceRenderer, radius: float) -> None:
     """How rays look for the set."""
     scene = ui.studio.scene
     w.group(ui, "Search")
-    w.field(ui, "renderer.search", segmented=True)
+    w.field(ui, "renderer.search")
     if renderer.search == "steps":
         w.field(ui, "renderer.step", start=radius / 100, auto=f"{radius / 100:.3g}")
     else:
@@ -140,7 +140,7 @@ def _points(ui: Ui, renderer: SurfaceRenderer) -> None:
     first = {"pattern": used.pattern, "count": used.count}
     if not w.optional(ui, "renderer.points", "Points", first, keeps=False) or renderer.points is None:
         return
-    w.field(ui, "renderer.points.pattern", segmented=True)
+    w.field(ui, "renderer.points.pattern")
     if renderer.points.pattern == "stochastic":
         w.field(ui, path)
         return

@@ -17,8 +17,8 @@ from clfractal.viewer.panels.ui import Ui
 
 _WORDS: dict[str, dict[str, Any]] = {
     "value": {"label": "Voxels hold"},
-    "store": {"words": {"byte": "8 bits", "float": "32 bits"}, "segmented": True},
-    "fill": {"words": {"octree": "Octree", "brute": "Every voxel"}, "segmented": True},
+    "store": {"words": {"byte": "8 bits", "float": "32 bits"}},
+    "fill": {"words": {"octree": "Octree", "brute": "Every voxel"}},
 }
 _SIDES = (64, 128, 192, 256, 384, 512, 768, 1024)
 
