@@ -39,6 +39,7 @@ ORBIT = Struct(
         Field("log_distance_bailout", "real", 0, "natural logarithm of the distance bailout"),
         Field("log2_degree", "real", 0, "binary logarithm of the degree of one application"),
         Field("solid_radius", "real", 0, "radius in z that holds the last solid, for degree 1"),
+        Field("unit", "real", 0, "one unit of the scene in the formula's space"),
         # What texts of several formulas, joined or applied in turn, read here.
         Field("first_count", "int", 0, "FIRST_COUNT of this formula, LOGARITHMIC and HAS_SHAPE"),
         Field("logarithmic", "int", 0, ""),
@@ -151,6 +152,7 @@ def orbit_record(
         "log_distance_bailout": math.log(outer),
         "log2_degree": math.log2(chain.degree) / chain.cycle_length if chain.degree > 1 else 0.0,
         "solid_radius": chain.solid_radius,
+        "unit": 1.0 if chain.place is None else chain.place.scale,
         "first_count": int(chain.starts_counted),
         "logarithmic": int(not linear),
         "has_shape": int(chain.has_solid),

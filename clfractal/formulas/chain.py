@@ -11,6 +11,7 @@ from typing import Any
 from clfractal.errors import FormulaError, Where
 from clfractal.formulas.definition import Add, BoundFormula
 from clfractal.formulas.nodes import Node
+from clfractal.formulas.place import Place
 from clfractal.formulas.turns import MAX_START, Span, spans_of
 
 MAX_LINKS = 64
@@ -60,6 +61,7 @@ class Chain:
         into an
             equal chain on any machine with this version of the library.
         order: the links' numbers in the order of their turns; None: as they stand.
+        place: where the scene's space lies in the formula's; None: they are the same.
     """
 
     links: tuple[Link, ...]
@@ -70,6 +72,7 @@ class Chain:
     title: str = ""
     source: Mapping[str, Any] | None = None
     order: tuple[int, ...] | None = None
+    place: Place | None = None
 
     def __post_init__(self) -> None:
         if not 1 <= len(self.links) <= MAX_LINKS:
@@ -89,7 +92,7 @@ class Chain:
         """All that a picture of the chain depends on."""
         links = tuple((link.bound.key, link.turns) for link in self.links)
         radii = (self.bailout_override, self.distance_bailout_override, self.step_scale_override)
-        return (links, self.order, self.bounds_override, radii)
+        return (links, self.order, self.bounds_override, radii, self.place)
 
     @cached_property
     def _hash(self) -> int:
@@ -169,10 +172,11 @@ class Chain:
     @cached_property
     def structure(self) -> tuple[object, ...]:
         """What its text depends on beside values of parameters, and beside `facts`."""
+        placed = self.place is not None
         if not self.turns_are_data:
-            return (self.order, *(link.structure for link in self.links))
+            return (placed, self.order, *(link.structure for link in self.links))
         members = tuple((link.bound.formula, link.bound.add) for link in self.links)
-        return (members, self.first_index, self.shape_index, self.rule_index)
+        return (placed, members, self.first_index, self.shape_index, self.rule_index)
 
     @property
     def facts(self) -> tuple[object, ...]:
@@ -311,16 +315,35 @@ class Chain:
     @cached_property
     def center(self) -> tuple[float, float, float]:
         """Centre of the bounding sphere, in scene units: that of the link with the largest one."""
-        if self.bounds_override:
-            return self.bounds_override[0]
-        return max((link.bound for link in self.links), key=lambda bound: bound.radius).center
+        own = self._own_ball[0]
+        return own if self.place is None else self.place.seen(own)
 
     @cached_property
     def radius(self) -> float:
         """Radius of the bounding sphere, in scene units: it holds every link's."""
+        return self.own_radius if self.place is None else self.own_radius * self.place.magnification
+
+    def placed(self, place: Place) -> Chain:
+        """The same formulas, of whose space a scene shows a place."""
+        known = self.__dict__.setdefault("_placed", {})
+        if place not in known:
+            known.clear()
+            known[place] = replace(self, place=place)
+        found: Chain = known[place]
+        return found
+
+    @property
+    def own_radius(self) -> float:
+        """The same in the formula's own space."""
+        return self._own_ball[1]
+
+    @cached_property
+    def _own_ball(self) -> tuple[tuple[float, float, float], float]:
         if self.bounds_override:
-            return self.bounds_override[1]
-        return max(math.dist(link.bound.center, self.center) + link.bound.radius for link in self.links)
+            return self.bounds_override
+        bounds = [link.bound for link in self.links]
+        center = max(bounds, key=lambda bound: bound.radius).center
+        return center, max(math.dist(bound.center, center) + bound.radius for bound in bounds)
 
     @property
     def solid_radius(self) -> float:

@@ -54,6 +54,7 @@ class EndsWriter(ABC):
         self.over_duals = {self.carried.index(name): c_type for name, c_type in over_duals.items()}
         if leaf is not None:
             self.over_duals = dict.fromkeys(range(self.room), "dual")
+        self.placed = chain.place is not None
         firsts = chain.links if chain.turns_are_data else (chain.links[chain.first_index],)
         self.begins = {link.bound.begins for link in firsts}
 
@@ -88,6 +89,8 @@ class EndsWriter(ABC):
 
         With f(0) = 0 the first application gives C; dual numbers at 0 would give 0 times infinity in many formulas.
         """
+        if self.placed:
+            return self._placed_start(number_type)
         names = ["point.x", "point.y", "point.z"]
         state = "state" if number_type == "real" else "dual_state"
         components = names if number_type == "real" else [f"dual_coordinate_{a[-1]}({a})" for a in names]
@@ -111,6 +114,39 @@ class EndsWriter(ABC):
         name = self.name + ("start" if number_type == "real" else "dual_start")
         head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
         return function_text(head, lines, None)
+
+    def _placed_start(self, number_type: NumberType) -> str:
+        """The same where a scene shows a place of the formula's space: orbits begin as a table says."""
+        over_reals = number_type == "real"
+        state = "state" if over_reals else "dual_state"
+        lines = [f"const placed at = placed_at(point, {self._table()}, k);"]
+        for i, axis in enumerate("xyz"):
+            near = self.constants.text((0, "center", i))
+            coordinate = f"{near} + at.moved.{axis}"
+            lines.append(
+                f"c->s{i} = {coordinate if over_reals else f'dual_coordinate_{axis}({coordinate})'};"
+            )
+        if self.size == 4:
+            lines += self._fourth(number_type)
+        lines += [f"z->s{i} = placed_{number_type}(&at, {i}, k);" for i in range(self.size)]
+        for place in range(self.room) if over_reals else sorted(self.over_duals):
+            plain = self.is_plain(number_type, place)
+            lines.append(f"c->e{place} = {'R(0.0)' if plain else 'dual_constant(R(0.0))'};")
+            kind = "real" if plain else "dual"
+            lines.append(f"z->e{place} = placed_{kind}(&at, {self.size + place}, k);")
+        lines += ["c->begun = R(0.0);", "z->begun = placed_count(&at, k);"]
+        name = "start" if over_reals else "dual_start"
+        head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
+        return function_text(head, lines, None)
+
+    def start_growth(self) -> str:
+        """The scalar derivative where an orbit begins."""
+        head = "INLINE real start_growth(vec point, __constant const scalar *k) {"
+        lines = [f"const placed at = placed_at(point, {self._table()}, k);"]
+        return function_text(head, lines, "return placed_growth(&at, k);")
+
+    def _table(self) -> str:
+        return f"(int)k[{self.constants.slot((0, 'place', 0))}]"
 
     def _fourth(self, number_type: NumberType) -> list[str]:
         """The fourth coordinate of a point in space, as the first link has it."""
@@ -245,6 +281,11 @@ def passed(chain: Chain, index: int, what: str, component: int, *, behind: int) 
     if what == "turns":
         table, again = chain.table
         return float((behind, len(table) - again, again)[component])
+    if what == "place":
+        return float(behind + (len(chain.table[0]) if chain.turns_are_data else 0))
+    if what == "center":
+        assert chain.place is not None
+        return chain.place.near[component]
     if what == "last":
         found = chain.rule_index if chain.rule_index is not None else chain.shape_index
         return float(-1 if found is None else found)

@@ -47,6 +47,7 @@ class ChainWriter(EndsWriter):
         if self.has_derivative:
             parts += (self._apply_derivative(index, usual=usual) for index, usual in self.ways)
             parts.append(self._dispatch("real", derivative=True))
+            parts += [self.start_growth()] if self.placed else []
         facts = Facts(
             self.width,
             int(self.chain.starts_counted),
@@ -57,9 +58,11 @@ class ChainWriter(EndsWriter):
             len(self.links) == 1 and not self._numbered(0) and self._operations() >= WORTH_CARRYING,
             self.room,
             self.by_record,
+            self.placed,
         )
-        types = state_functions(self.width, self.room, self.over_duals)
-        head = [facts.defines() + each_usual(1), types] if self.leaf is None else []
+        types = state_functions(self.width, self.room, self.over_duals, placed=self.placed)
+        included = ['#include "formulas/place.h"'] if self.placed else []
+        head = [*included, facts.defines() + each_usual(1), types] if self.leaf is None else []
         return "\n".join([*head, *parts]) + "\n", facts, self.constants
 
     def _numbered(self, index: int) -> bool:
@@ -336,11 +339,33 @@ class ChainWriter(EndsWriter):
                 before += self.links[index].count
                 lines.append(f"if (turn < {before}) {call(index)}")
         arguments = f"int n, {state} z, {state} c{extra}, __constant const scalar *k"
-        head = f"INLINE {state} {name}_by(int usual, {arguments}) {{"
+        inner = f"{name}_begun" if self.placed else f"{name}_by"
+        head = f"INLINE {state} {inner}(int usual, {arguments}) {{"
         both = f"return {name}_by({self.name}has_usual_values(k), n, z, c{passed}, k);"
-        return function_text(head, lines, call(last)) + function_text(
-            f"INLINE {state} {name}({arguments}) {{", [both], None
+        waiting = self._waiting(name, state, arguments, derivative=derivative) if self.placed else ""
+        return "".join(
+            [
+                function_text(head, lines, call(last)),
+                waiting,
+                function_text(f"INLINE {state} {name}({arguments}) {{", [both], None),
+            ]
         )
+
+    @staticmethod
+    def _waiting(name: str, state: str, arguments: str, *, derivative: bool) -> str:
+        """An application of those lanes whose orbits have begun; the others wait."""
+        growth, passed = (["real grown = *growth;"], ", &grown") if derivative else ([], "")
+        lines = [
+            "const mask begun = less_equal(z.begun, (real)((scalar)n));",
+            "if (!any_lane(begun)) return z;",
+            *growth,
+            f"{state} next = {name}_begun(usual, n, z, c{passed}, k);",
+            "next.begun = R(0.0);",
+            *(["*growth = pick(begun, grown, *growth);"] if derivative else []),
+        ]
+        pick = "state_pick" if state == "state" else "dual_state_pick"
+        head = f"INLINE {state} {name}_by(int usual, {arguments}) {{"
+        return function_text(head, lines, f"return {pick}(begun, next, z);")
 
     def shaped(self, index: int) -> bool:
         """Whether a link has parameters whose usual values are literals."""

@@ -24,6 +24,7 @@ class Facts:
             step, and is the same however many have been.
         carried: numbers that go on beside z.
         by_record: which of these differ with a chain's turns: they are read from the orbit's record.
+        placed: orbits begin as a table says; see `deep.py`.
     """
 
     size: int
@@ -35,6 +36,7 @@ class Facts:
     carries_orbits: bool
     carried: int = 0
     by_record: frozenset[str] = frozenset()
+    placed: bool = False
 
     def of(self, chain: Chain) -> Facts:
         """The same of a chain with other turns, whose text this is too."""
@@ -60,6 +62,8 @@ class Facts:
         }
         if self.carried:
             values["STATE_CARRIED"] = self.carried
+        if self.placed:
+            values["PLACED"] = 1
         return "".join(f"#define {name} {value}\n" for name, value in {**values, **read, **others}.items())
 
 
@@ -68,17 +72,21 @@ def each_usual(formulas: int) -> str:
     return f"#define EACH_USUAL(DO) {' '.join(f'DO({which + 1})' for which in range(formulas))}\n"
 
 
-def state_functions(size: int, carried: int = 0, over_duals: Mapping[int, str] | None = None) -> str:
+def state_functions(
+    size: int, carried: int = 0, over_duals: Mapping[int, str] | None = None, *, placed: bool = False
+) -> str:
     """The state of an orbit, by components so that every one can live in a register.
 
     Args:
         size: numbers of z.
         carried: numbers beside it.
         over_duals: those of them that go with z over dual numbers, and their types.
+        placed: whether it waits until an application, which is then kept.
     """
     fields = [f"s{i}" for i in range(size)]
-    beside = [f"e{i}" for i in range(carried)]
-    over = {f"e{i}": c_type for i, c_type in (over_duals or {}).items()}
+    waits = ["begun"] if placed else []
+    beside = [f"e{i}" for i in range(carried)] + waits
+    over = {f"e{i}": c_type for i, c_type in (over_duals or {}).items()} | dict.fromkeys(waits, "real")
 
     def each(text: str, join: str = ", ", also: str = "") -> str:
         return join.join([text.replace("@", field) for field in fields] + ([also] if also else []))

@@ -65,6 +65,19 @@ def apply(
         number: the application's, from 0.
         carried: the names of the latter; None: those of the formula.
     """
+    return applied(bound, state, constant, backend, number=number, carried=carried)[0]
+
+
+def applied(
+    bound: BoundFormula,
+    state: Sequence[Any],
+    constant: Sequence[Any],
+    backend: Backend,
+    *,
+    number: int = 0,
+    carried: Sequence[str] | None = None,
+) -> tuple[list[Any], dict[str, Any]]:
+    """The same, and the values of all names that a scalar rule for the derivative may use."""
     formula = bound.formula
     size = len(formula.variables)
     if carried is None:
@@ -83,7 +96,7 @@ def apply(
         for name, node in formula.let:
             names[name] = evaluate(node, names, backend)
         state = [evaluate(node, names, backend) for node in formula.map]
-    return [*_added(bound, state, constant, backend), *beside]
+    return [*_added(bound, state, constant, backend), *beside], names
 
 
 def _added(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
@@ -99,7 +112,7 @@ def _apply_steps(
     backend: Backend,
     number: int,
     carried: Sequence[str],
-) -> list[Any]:
+) -> tuple[list[Any], dict[str, Any]]:
     """An application of a formula that is told in statements."""
     formula = bound.formula
     own = {each.name for each in formula.state}
@@ -113,7 +126,7 @@ def _apply_steps(
     names.update({name: value for name, value in beside.items() if name in own})
     run(formula.steps, names, backend)
     z = _added(bound, [names[name] for name in formula.variables], constant, backend)
-    return [*z, *(names[name] if name in own else value for name, value in beside.items())]
+    return [*z, *(names[name] if name in own else value for name, value in beside.items())], names
 
 
 def carried_at_start(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:

@@ -221,7 +221,7 @@ def march_record(
     renderer, bodies = scene.surface, set_bodies(scene)
     center, radius = scene.bounds
     occlusion, rays = renderer.ambient_occlusion, hemisphere_rays(scene)
-    half = radius / 2
+    half = scene.size / 2
     distance = half if occlusion is None or occlusion.distance is None else occlusion.distance
     largest = float(np.finfo(np.float32).max) / 16
     limit = firefly_limit(scene)
@@ -257,7 +257,7 @@ def march_record(
         "hollows": int(has_hollows(scene)),
         # A distance of degree 1 is the true one.
         "first_slope": FIRST_SLOPE if scene.joined or scene.chain.degree > 1 else 1.0,
-        "step": renderer.step if renderer.step is not None else radius / 100,
+        "step": renderer.step if renderer.step is not None else scene.size / 100,
         "touch_share": touch,
         # The search by steps begins at the eye, and goes both ways from the touch.
         "point_start": POINT_START * spread if renderer.search == "distance" else largest,

@@ -201,6 +201,11 @@ def choose_precision(
     """
     if wanted == "float64" and not has_float64:
         raise SceneError("the device has no float64; use float32", Where(path="precision"))
+    if scene.deep is not None:
+        if wanted == "float32" or not has_float64:
+            cause = "the device has none" if wanted != "float32" else "got float32"
+            raise SceneError(f"deep needs float64, and {cause}", Where(path="precision"))
+        return "float64", ""
     if wanted != "auto":
         return wanted, ""
     view = scene_view(scene, eye)

@@ -247,7 +247,7 @@ def _glow(scene: Scene) -> dict[str, object]:
     glow = scene.glow or Glow()
     return {
         "glow_color": tuple(glow.intensity * part for part in glow.color),
-        "glow_width": glow.used_width(scene.bounds[1]),
+        "glow_width": glow.used_width(scene.size),
         "glow_reach": glow.reach,
         "glow_trap": TRAPS[glow.trap.shape] if glow.by == "trap" else 0,
         "glow_center": glow.trap.center,
@@ -258,7 +258,7 @@ def _glow(scene: Scene) -> dict[str, object]:
 
 def _mist(scene: Scene) -> dict[str, object]:
     """The fields of a Material for `kernels/integrators/mist.cl`."""
-    mist, radius = scene.mist or Mist(), scene.bounds[1]
+    mist, radius = scene.mist or Mist(), scene.size
     places = [stop.at for stop in mist.colors]
     more = MAX_STOPS - len(places)
     # (Where a colour changes at once, the slope only has to be too steep to be seen.)
@@ -285,7 +285,7 @@ def _carried(scene: Scene, coloring: Coloring | Map) -> int:
 
 def _way_and_trap(scene: Scene, coloring: Coloring | Map) -> dict[str, object]:
     """The fields of a Material for `kernels/shading/coloring.h`."""
-    radius = scene.bounds[1]
+    radius = scene.size
     step = coloring.step if coloring.step is not None else radius / 100
     kind = coloring.kind
     assert kind is not None

@@ -91,7 +91,7 @@ def check_layers(scene: Scene, names: Sequence[str], where: str) -> None:
 
 
 def _check_steps(scene: Scene) -> None:
-    radius = scene.bounds[1]
+    radius = scene.size
     _check_step(scene.coloring.step, radius, "coloring.step")
     if isinstance(scene.renderer, SurfaceRenderer):
         _check_step(scene.renderer.step, radius, "renderer.step")
@@ -158,7 +158,7 @@ def used_boxes(scene: Scene, renderer: VolumeRenderer) -> tuple[Box, Box]:
     Raises:
         SceneError: a zoom's box is not within the one before.
     """
-    center, radius = scene.bounds
+    center, radius = scene.bounds if scene.deep is None else ((0.0, 0.0, 0.0), scene.size)
     first = renderer.box if renderer.box is not None else Box(center=center, size=2 * radius)
     last = first
     for index, zoom in enumerate(renderer.zoom):

@@ -18,6 +18,7 @@ from clfractal.scene.animation import Animation
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
+from clfractal.scene.deep import Deep
 from clfractal.scene.formula import Formula
 from clfractal.scene.glow import Glow
 from clfractal.scene.layout import Layout, Place
@@ -66,6 +67,9 @@ class Scene(Section):
 
     version: Literal[1] = Field(description="version of this schema")
     formula: Formula
+    deep: Deep | None = Field(
+        None, description="a place of the formula's space that is shown magnified; null: the space itself"
+    )
     camera: Camera
     # Defaults are data, checked when used: an instance here would build its model on import.
     image: Image = Field(default_factory=dict, validate_default=True)
@@ -228,7 +232,7 @@ class Scene(Section):
                 return given.place.extent
             if renderer.box is not None:
                 return Extent.box(renderer.box.center, renderer.box.sides)
-        return Extent(*self.bounds)
+        return Extent(*self.bounds) if self.deep is None else Extent((0.0, 0.0, 0.0), self.size)
 
     @property
     def folder(self) -> Path:
@@ -334,9 +338,17 @@ class Scene(Section):
         """
         from clfractal.formulas import catalog
 
-        return self.once(
+        chain = self.once(
             "chain", lambda: catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
         )
+        deep = self.deep
+        return chain if deep is None else chain.placed(deep.place(self.formula.iterations))
+
+    @property
+    def size(self) -> float:
+        """What lengths that nobody has said follow: the bounds' radius; of a place shown magnified the formula's own."""
+        own = isinstance(self.renderer, SurfaceRenderer) and self.renderer.bounds is not None
+        return self.bounds[1] if own or self.deep is None else self.chain.own_radius
 
     @property
     def carried(self) -> tuple[str, ...]:

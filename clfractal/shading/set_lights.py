@@ -76,7 +76,7 @@ def _set_lights(scene: Scene) -> SetLights | None:
 
 def _balls(scene: Scene, number: int, light: SetLight) -> tuple[Floats, Floats]:
     places = places_of(scene, number)
-    radius = light.radius if light.radius is not None else scene.bounds[1] / 200
+    radius = light.radius if light.radius is not None else scene.size / 200
     height = light.height if light.height is not None else radius
     rows = np.zeros((len(places.trap), BALL_NUMBERS))
     rows[:, :3] = places.surface + height * places.normal

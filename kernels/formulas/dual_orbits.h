@@ -17,13 +17,16 @@ typedef struct {
 INLINE dual_limit dual_limit_none(mask active) { return (dual_limit){active & ~active, {R(0.0), R(0.0), R(0.0)}}; }
 
 // Lanes that are `late` go on; the other active ones begin at their points. `c` is what their applications add.
-INLINE void dual_orbit_begin(dual_orbit *o, dual_state *c, vec point, mask active, mask late, orbit_record orbit, constants k) {
+// The first application of these orbits is the answer.
+INLINE int dual_orbit_begin(dual_orbit *o, dual_state *c, vec point, mask active, mask late, orbit_record orbit, constants k) {
     dual_state z;
     dual_start(point, k, c, &z);
     const real square = dual_state_square(z);
     o->z = dual_state_pick(late, o->z, z);
     if (!LOGARITHMIC) o->square_before = pick(late, o->square_before, square);
-    orbit_lanes_begin(&o->lanes, square, late, active, orbit);
+    const int first = ORBIT_FIRST(z, active & ~late);
+    orbit_lanes_begin(&o->lanes, square, first, late, active, orbit);
+    return first;
 }
 
 INLINE void dual_orbit_apply(int usual, dual_orbit *o, int n, dual_state c, orbit_record orbit, constants k) {
@@ -37,15 +40,15 @@ INLINE void dual_orbit_apply(int usual, dual_orbit *o, int n, dual_state c, orbi
 // The surface of the solid is where |z| is the bailout after `iterations` applications, and its gradient is J^T z there. The last z of
 // a place beside it may be some applications farther. By them space is stretched once more, and where it is stretched unevenly their level
 // sets face elsewhere. So no gradient `of` the surface is that of a z after `gradient_limit`: see `dual_limit`.
-INLINE void dual_orbit_run(int usual, dual_orbit *o, dual_state c, mask active, int of, int carries, dual_limit *at_limit,
+INLINE void dual_orbit_run(int usual, dual_orbit *o, dual_state c, int first, mask active, int of, int carries, dual_limit *at_limit,
                            orbit_record orbit, constants k) {
     const uint begun = lanes_bits(active);
-    for (int n = FIRST_COUNT; IS_WITHIN_LONGEST(n, orbit); ++n) {
+    for (int n = first; IS_WITHIN_LONGEST(n, orbit); ++n) {
         const int looks = of == OF_SURFACE && o->lanes.look == 0;
         const int goes_on = lanes_go_on(&o->lanes, begun, carries, orbit);
         if (looks) {
             const mask here = o->lanes.alive & equal_ints(o->lanes.count, (mask)(orbit->gradient_limit));
-            at_limit->gradient = vec_pick(here, dual_state_gradient(o->z, R(1.0) / o->lanes.square), at_limit->gradient);
+            at_limit->gradient = vec_pick(here, dual_state_gradient(o->z, IN_SCENE(R(1.0) / o->lanes.square)), at_limit->gradient);
             at_limit->left |= here;
         }
         if (!goes_on) return;
@@ -62,13 +65,13 @@ INLINE clearance dual_orbit_end(const dual_orbit *o, mask active, const dual_lim
     if (ENDS_BY_SHAPE) {
         // The last solid's distance in z, over how fast it changes per scene unit.
         const dual solid = dual_solid_distance(o->z, k);
-        surface->gradient = vec_of(solid.dx, solid.dy, solid.dz);
+        surface->gradient = vec_of(IN_SCENE(solid.dx), IN_SCENE(solid.dy), IN_SCENE(solid.dz));
         const real solid_growth = vec_dot(surface->gradient, surface->gradient);
         distance = most(R(0.0), solid.v * pick(less(R(0.0), solid_growth), R(1.0) / sqrt(solid_growth), R(0.0)));
         inside = active & less_equal(solid.v, R(0.0));
     } else {
         // J^T z / |z|^2: dividing by |z|^2 first keeps the squares within range.
-        const vec relative = dual_state_gradient(o->z, R(1.0) / o->lanes.square);
+        const vec relative = dual_state_gradient(o->z, IN_SCENE(R(1.0) / o->lanes.square));
         const real relative_square = vec_dot(relative, relative);
         surface->gradient = vec_pick(at_limit->left, at_limit->gradient, relative);
         distance = distance_from_growth(o->lanes.square, R(1.0) / sqrt(relative_square), count, orbit);
@@ -85,8 +88,8 @@ INLINE clearance dual_orbit_by(int usual, dual_orbit *o, vec point, mask active,
                                orbit_record orbit, constants k, surface_point *surface) {
     dual_state c;
     at_limit->left &= *late;
-    dual_orbit_begin(o, &c, point, active, *late, orbit, k);
-    dual_orbit_run(usual, o, c, active, of, carries, at_limit, orbit, k);
+    const int first = dual_orbit_begin(o, &c, point, active, *late, orbit, k);
+    dual_orbit_run(usual, o, c, first, active, of, carries, at_limit, orbit, k);
     *late = o->lanes.alive;
     return dual_orbit_end(o, active, at_limit, orbit, k, surface);
 }

@@ -29,16 +29,17 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
     const real radius_square = (real)(smooth ? orbit->distance_square : orbit->bailout_square);
     real square = state_square(z);
     real square_before = square;
-    real count = (real)((scalar)min(FIRST_COUNT, most));
+    const int first = ORBIT_FIRST(z, active);
+    real count = (real)((scalar)min(first, most));
     mask alive = active & less_equal(square, radius_square);
     mask inside = active & ~active;
     state kept = z;
     real highest = square;  // |z|^2 since then
     const int check = CYCLE * max(1, PERIOD_CHECK / CYCLE);
-    int next_keep = FIRST_COUNT + check;
+    int next_keep = first + check;
     // Equal states have equal futures only where the turns repeat.
-    int kept_at = FIRST_COUNT, comparable = FIRST_COUNT >= REPEATS_FROM;
-    int n = FIRST_COUNT, limit = most;
+    int kept_at = first, comparable = first >= REPEATS_FROM;
+    int n = first, limit = most;
     for (int past_limit = 0; past_limit <= smooth; ++past_limit) {
         while (n < limit) {
             if (!any_lane(alive) || orbit_cancelled(orbit)) break;
@@ -54,7 +55,7 @@ INLINE escaped escape_by(int usual, vec point, mask active, int smooth, int peri
                 if (!ENDS_BY_SHAPE && smooth) highest = fmax(highest, square);
             }
             if (!ENDS_BY_SHAPE && periodicity) {
-                mask back = alive;
+                mask back = alive & HAS_BEGUN(z);
 #define BACK(s) back &= same_bits(z.s, kept.s);
                 STATE_EACH(BACK)
                 // An orbit that comes and goes between the two radii is inside or not by the last application.

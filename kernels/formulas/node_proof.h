@@ -23,22 +23,24 @@ INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, con
 #if HAS_DERIVATIVE
     state c, z;
     start(point, k, &c, &z);
-    real growth = R(1.0), square = state_square(z);
+    real growth = START_GROWTH(point), square = state_square(z);
 #else
     dual_state c, z;
     dual_start(point, k, &c, &z);
     real square = dual_state_square(z);
 #endif
-    real count = (real)((scalar)FIRST_COUNT);
+    const real own_reach = IN_SCENE(reach);
+    const int first = ORBIT_FIRST(z, equal(R(0.0), R(0.0)));
+    real count = (real)((scalar)first);
     mask alive = less_equal(square, (real)(orbit->distance_square));
     mask near = alive & ~alive;
-    for (int n = FIRST_COUNT; n < orbit->longest; ++n) {
+    for (int n = first; n < orbit->longest; ++n) {
         if (n % ORBIT_LOOK == ORBIT_LOOK - 1 && orbit_cancelled(orbit)) break;
         if (n == orbit->iterations) near |= alive & in_set(square, orbit);
 #if HAS_DERIVATIVE
-        near |= alive & doubtful(square, (reach * growth) * (reach * growth), orbit);
+        near |= alive & doubtful(square, (own_reach * growth) * (own_reach * growth), orbit);
 #else
-        near |= alive & doubtful(square, reach * reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)), orbit);
+        near |= alive & doubtful(square, own_reach * own_reach * (STATE_DOT(dx, dx) + STATE_DOT(dy, dy) + STATE_DOT(dz, dz)), orbit);
 #endif
         alive &= ~near;
         if (!any_lane(alive)) break;
@@ -65,7 +67,7 @@ INLINE real formula_node_distance(vec point, real reach, orbit_record orbit, con
     const real xy = fabs(STATE_DOT(dx, dy)), yz = fabs(STATE_DOT(dy, dz)), zx = fabs(STATE_DOT(dz, dx));
     const real growth = sqrt(fmax(fmax(xx + xy + zx, yy + xy + yz), zz + yz + zx));
 #endif
-    const real distance = distance_from_growth(square, sqrt(square) / growth, count, orbit);
+    const real distance = distance_from_growth(square, sqrt(square) / IN_SCENE(growth), count, orbit);
     return pick(near, R(0.0), distance);
 }
 
@@ -90,6 +92,14 @@ INLINE real bend_square(state a, state b, state middle) {
     return state_square(d);
 }
 
+// Whether all of a node's orbits have begun.
+INLINE mask node_begun(const state *z) {
+    mask begun = HAS_BEGUN(z[CORNERS]);
+    UNROLLED_ALONE
+    for (int i = 0; i < TURNS(CORNERS); ++i) begun &= HAS_BEGUN(z[i]);
+    return begun;
+}
+
 // A node is inside as a whole if, after every application, its image in z is near to a parallelepiped, as its corners and its
 // middle tell, and twice its size around the middle's is within the bailout. Where the dynamics contract, that image shrinks;
 // at the edge of a region of contraction it bends (for analytic maps by r/d, d the distance to the edge: Koebe's theorem).
@@ -105,7 +115,10 @@ INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, orbi
     }
     start(middle, k, &c[CORNERS], &z[CORNERS]);
     mask alive = candidates;
-    for (int n = min(FIRST_COUNT, orbit->iterations);; ++n) {
+    int first = ORBIT_FIRST(z[CORNERS], candidates);
+    UNROLLED_ALONE
+    for (int i = 0; i < TURNS(CORNERS); ++i) first = min(first, ORBIT_FIRST(z[i], candidates));
+    for (int n = min(first, orbit->iterations);; ++n) {
         real spread = R(0.0), bend = R(0.0);
         UNROLLED_ALONE
         for (int i = 0; i < TURNS(CORNERS / 2); ++i) {
@@ -114,8 +127,10 @@ INLINE mask formula_node_inside(vec middle, vec half_side, mask candidates, orbi
         }
         // (|m| + 2 s)^2 <= 2 m^2 + 8 s^2
         const real reach = R(2.0) * state_square(z[CORNERS]) + R(8.0) * spread;
-        alive &= less_equal(reach, (real)(orbit->bailout_square));
-        alive &= less_equal(bend, (real)(BEND * BEND) * spread + R(1e-10));
+        // Until they begin orbits are together, near one that is within the bailout.
+        const mask waits = ~node_begun(z);
+        alive &= waits | less_equal(reach, (real)(orbit->bailout_square));
+        alive &= waits | less_equal(bend, (real)(BEND * BEND) * spread + R(1e-10));
         if (n >= orbit->iterations || !any_lane(alive)) break;
         UNROLLED_ALONE
         for (int i = 0; i < TURNS(CORNERS + 1); ++i) z[i] = apply(n, z[i], c[i], k);

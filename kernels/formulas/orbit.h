@@ -53,8 +53,9 @@ INLINE orbit_counted formula_escape_count(vec point, mask active, orbit_record o
     start(point, k, &c, &z);
     real square = state_square(z);
     mask alive = active & less_equal(square, (real)(orbit->bailout_square));
-    mask count = (active & ~active) + min(FIRST_COUNT, orbit->iterations);
-    for (int n = FIRST_COUNT, look = ORBIT_LOOK; n < orbit->iterations; ++n) {
+    const int first = ORBIT_FIRST(z, active);
+    mask count = (active & ~active) + min(first, orbit->iterations);
+    for (int n = first, look = first + ORBIT_LOOK; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
         if (n == look) {
             if (orbit_cancelled(orbit)) break;
@@ -81,9 +82,10 @@ INLINE orbit_end end_by(int usual, vec point, mask active, int limit, orbit_reco
     state c, z;
     start(point, k, &c, &z);
     real square = state_square(z);
-    real count = (real)((scalar)min(FIRST_COUNT, limit));
+    const int first = ORBIT_FIRST(z, active);
+    real count = (real)((scalar)min(first, limit));
     mask alive = active & less_equal(square, (real)(orbit->distance_square));
-    for (int n = FIRST_COUNT, look = ORBIT_LOOK; n < limit; ++n) {
+    for (int n = first, look = first + ORBIT_LOOK; n < limit; ++n) {
         if (!any_lane(alive)) break;
         if (n == look) {
             if (orbit_cancelled(orbit)) break;

@@ -23,9 +23,10 @@ INLINE real formula_told(trap near, int carried, vec point, mask active, orbit_r
     state c, z;
     start(point, k, &c, &z);
     const real at_start = trap_distance(near, z);
-    real nearest = FIRST_COUNT > 0 ? at_start : (real)(REAL_LARGEST);
+    const int first = ORBIT_FIRST(z, active);
+    real nearest = first > 0 ? at_start : (real)(REAL_LARGEST);
     mask alive = active & less_equal(state_square(z), (real)(orbit->bailout_square));
-    for (int n = FIRST_COUNT; n < orbit->iterations; ++n) {
+    for (int n = first; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;
         const state next = apply(n, z, c, k);
         const mask applied = going_on(alive);

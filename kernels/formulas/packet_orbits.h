@@ -21,14 +21,14 @@ typedef struct {
 // lane once (of duals on AMD's GPUs: 49 registers in the place of 61).
 #define IS_WITHIN_LONGEST(n, orbit) (LANES > 1 || (n) <= (orbit)->longest)
 
-INLINE void orbit_lanes_begin(orbit_lanes *o, real square, mask late, mask active, orbit_record orbit) {
+INLINE void orbit_lanes_begin(orbit_lanes *o, real square, int first, mask late, mask active, orbit_record orbit) {
     const mask fresh = active & ~late;
     o->square = pick(late, o->square, square);
-    o->count = (o->count & late) | (~late & (mask)(FIRST_COUNT));
+    o->count = (o->count & late) | (~late & (mask)(first));
     o->alive = (o->alive & late) | (fresh & less_equal(square, (real)(orbit->distance_square)));
     o->inside &= late;
-    const int first = max(min(ORBIT_LOOK, orbit->iterations) - FIRST_COUNT, 0);
-    o->look = any_lane(late) ? min(o->look, first) : first;
+    const int look = max(min(first + ORBIT_LOOK, orbit->iterations) - first, 0);
+    o->look = any_lane(late) ? min(o->look, look) : look;
 }
 
 INLINE void lanes_applied(orbit_lanes *o, real square, orbit_record orbit) {

@@ -8,12 +8,15 @@ typedef struct {
     real growth;
 } scalar_orbit;
 
-INLINE void scalar_orbit_begin(scalar_orbit *o, state *c, vec point, mask active, mask late, orbit_record orbit, constants k) {
+// The first application of these orbits.
+INLINE int scalar_orbit_begin(scalar_orbit *o, state *c, vec point, mask active, mask late, orbit_record orbit, constants k) {
     state z;
     start(point, k, c, &z);
     o->z = state_pick(late, o->z, z);
-    o->growth = pick(late, o->growth, R(1.0));
-    orbit_lanes_begin(&o->lanes, state_square(z), late, active, orbit);
+    o->growth = pick(late, o->growth, START_GROWTH(point));
+    const int first = ORBIT_FIRST(z, active & ~late);
+    orbit_lanes_begin(&o->lanes, state_square(z), first, late, active, orbit);
+    return first;
 }
 
 INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, state c, orbit_record orbit, constants k) {
@@ -28,13 +31,14 @@ INLINE void scalar_orbit_apply(int usual, scalar_orbit *o, int n, state c, orbit
 INLINE clearance scalar_orbit_end(const scalar_orbit *o, mask active, orbit_record orbit, constants k) {
     mask inside = o->lanes.inside;
     const real count = to_reals(o->lanes.count);
+    const real growth = IN_SCENE(o->growth);
     real distance;
     if (HAS_SHAPE) {
         const real solid = solid_distance(o->z, k);
-        distance = most(R(0.0), solid / o->growth);
+        distance = most(R(0.0), solid / growth);
         if (ENDS_BY_SHAPE) inside = active & less_equal(solid, R(0.0));
     } else {
-        distance = distance_from_growth(o->lanes.square, sqrt(o->lanes.square) / o->growth, count, orbit);
+        distance = distance_from_growth(o->lanes.square, sqrt(o->lanes.square) / growth, count, orbit);
     }
     const real step = pick(inside, R(0.0), distance);
     return (clearance){step, {count, inside}, step};
@@ -45,8 +49,8 @@ INLINE clearance scalar_orbit_by(int usual, scalar_orbit *o, vec point, mask act
                                  constants k) {
     const uint begun = lanes_bits(active);
     state c;
-    scalar_orbit_begin(o, &c, point, active, *late, orbit, k);
-    for (int n = FIRST_COUNT; IS_WITHIN_LONGEST(n, orbit) && lanes_go_on(&o->lanes, begun, carries, orbit); ++n) {
+    const int first = scalar_orbit_begin(o, &c, point, active, *late, orbit, k);
+    for (int n = first; IS_WITHIN_LONGEST(n, orbit) && lanes_go_on(&o->lanes, begun, carries, orbit); ++n) {
         scalar_orbit_apply(usual, o, n, c, orbit, k);
     }
     *late = o->lanes.alive;
@@ -71,15 +75,15 @@ INLINE void scalar_orbits_by(int usual, scalar_orbit *a, scalar_orbit *b, const 
                              clearance *found, orbit_record orbit, constants k) {
     const uint begun[2] = {lanes_bits(active[0]), lanes_bits(active[1])};
     state c, d;
-    scalar_orbit_begin(a, &c, points[0], active[0], late[0], orbit, k);
-    scalar_orbit_begin(b, &d, points[1], active[1], late[1], orbit, k);
-    for (int n = FIRST_COUNT, first = 1, second = 1;; ++n) {
+    const int begin_a = scalar_orbit_begin(a, &c, points[0], active[0], late[0], orbit, k);
+    const int begin_b = scalar_orbit_begin(b, &d, points[1], active[1], late[1], orbit, k);
+    for (int n = 0, first = 1, second = 1;; ++n) {
         // One of them may go on for long.
         if (first) first = lanes_go_on(&a->lanes, begun[0], carries, orbit);
         if (second) second = lanes_go_on(&b->lanes, begun[1], carries, orbit);
         if (!(first | second)) break;
-        if (first) scalar_orbit_apply(usual, a, n, c, orbit, k);
-        if (second) scalar_orbit_apply(usual, b, n, d, orbit, k);
+        if (first) scalar_orbit_apply(usual, a, begin_a + n, c, orbit, k);
+        if (second) scalar_orbit_apply(usual, b, begin_b + n, d, orbit, k);
     }
     late[0] = a->lanes.alive;
     late[1] = b->lanes.alive;

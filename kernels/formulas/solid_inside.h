@@ -31,10 +31,11 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
     state past = z;
     real square = state_square(z);
     mask alive = less_equal(square, farthest);
-    int look = FIRST_COUNT + CHUNK, looks = 0, renewed = 1;
+    const int first = ORBIT_FIRST(z, alive);
+    int look = first + CHUNK, looks = 0, renewed = 1;
     // Equal states have equal futures only where the turns repeat.
-    int kept = FIRST_COUNT, comparable = FIRST_COUNT >= REPEATS_FROM;
-    for (int n = FIRST_COUNT; n < limit && alive; ++n) {
+    int kept = first, comparable = first >= REPEATS_FROM;
+    for (int n = first; n < limit && alive; ++n) {
         z = apply(n, z, c, k);
         square = state_square(z);
         alive = less_equal(square, farthest);
@@ -70,7 +71,9 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         periodic[p] = ~all_lanes;
         open |= alive[p];
     }
-    int n = FIRST_COUNT, renewed = 1, chunks = 0;
+    int n = ORBIT_FIRST(z[0], alive[0]), renewed = 1, chunks = 0;
+    #pragma unroll
+    for (int p = 1; p < TURNS(PACKETS); ++p) n = min(n, ORBIT_FIRST(z[p], alive[p]));
     int kept = n, comparable = n >= REPEATS_FROM;  // as above
     while (n + CHUNK <= limit && any_lane(open)) {
         if ((chunks & 1023) == 1023 && orbit_cancelled(orbit)) return;
@@ -89,7 +92,7 @@ INLINE void orbits_inside(const vec *points, mask *inside, orbit_record orbit, c
         #pragma unroll
         for (int p = 0; p < TURNS(PACKETS); ++p) {
             if (LOGARITHMIC && comparable && (n - kept) % CYCLE == 0) {
-                periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & in_set(square[p], orbit);
+                periodic[p] |= alive[p] & equal(apart_square(z[p], past[p]), R(0.0)) & HAS_BEGUN(z[p]) & in_set(square[p], orbit);
             }
             if (LOGARITHMIC && chunks == renewed) past[p] = z[p];
             open |= alive[p] & ~periodic[p];

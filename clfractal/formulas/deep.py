@@ -1,0 +1,173 @@
+"""Orbits of a place of any depth: where those of all points around it begin, many applications on.
+
+Near a place orbits stay together for long. With Z_k the place's own state after k applications, and J_k how it changes
+with the point, those of points p near it are Z_k + J_k p as long as the map is straight over them. So an orbit begins
+at the last k at which that is exact enough, and is applied from there in the device's numbers: by then what is seen in
+the picture is some 1e-6 wide in z, which these resolve. (Series for the orbits of Mandelbrot sets: K. I. Martin,
+Superfractalthing Maths, 2013. Here it is the formula's own tree that is differentiated, in three dimensions, with the
+bound below.)
+
+|p| alone decides where a point's orbit begins, in steps of 4: a table has for each the count, and there Z, J, and the
+scalar derivative. The bound: B_k being the second derivatives, what is left out is B_k p p / 2. It moves the point
+itself by |J_k^+ B_k| |p|^2 / 2, which is to be at most `STRAIGHT` of |p|; and |J_k p| is to be at most that, too. At
+conditions, folds and poles the map goes another way: no orbit begins behind one that lies nearer than 2 |p|.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from clfractal.errors import FormulaError, Where
+from clfractal.formulas.chain import Chain
+from clfractal.formulas.evaluate import evaluate
+from clfractal.formulas.jets import Jet, JetBackend, constant_jet, coordinate_jet, full_bend
+from clfractal.formulas.reference import applied, carried_at_start, constant_of, space_to_state
+
+STRAIGHT = 2.0**-20
+"""What linear orbits may be off, as a part of the distance from the place."""
+NEAREST = -40
+"""Binary exponent of |p| of the nearest points that are told apart, scene units: some 1e-12 of one."""
+STEP = 2
+"""How many of these exponents share an entry of the table (`PLACE_STEP` in `kernels/formulas/place.h`)."""
+FARTHEST = 8
+"""How much farther than the set itself the farthest are, as an exponent."""
+# Orbits of one place are found anew where it is magnified by so many more bits: films share them in between.
+_SHARED_BITS = 64
+# Digits that values have beyond those of the nearest points.
+_BITS_BESIDE = 80
+# A map that flattens space more than this has no slope in a direction: what happens there, higher derivatives decide.
+_FLAT = 1e-12
+# No orbit begins where it ends.
+_WITHIN = 0.999
+
+
+@dataclass(frozen=True, slots=True)
+class Begun:
+    """Where orbits of points begin that are up to `reach` from a place; lengths are those of the formula's own space.
+
+    Attributes:
+        count: applications behind them.
+        state: of the place, z and what is carried beside it.
+        slopes: how these change with the point, shape (n, 3).
+        growth: the scalar derivative, or 1.
+    """
+
+    count: int
+    state: tuple[float, ...]
+    slopes: NDArray[np.float64]
+    growth: float
+    reach: float
+
+    def numbers(self) -> Iterator[float]:
+        """An entry of the table: `place.h` has what stands where."""
+        yield float(self.count)
+        yield self.growth
+        for value, slopes in zip(self.state, self.slopes, strict=True):
+            yield value
+            yield from map(float, slopes)
+
+
+def table_of(chain: Chain) -> tuple[float, ...]:
+    """The table of a placed chain as kernels read it: a head of four numbers, then its entries.
+
+    Raises:
+        FormulaError: mpmath is not there; the path says where.
+    """
+    place = chain.place
+    assert place is not None
+    farthest = math.dist(chain.center, (0.0, 0.0, 0.0)) + chain.radius
+    highest = max(math.ceil(math.log2(max(farthest, 1.0))) + FARTHEST, NEAREST + STEP)
+    begun = begun_orbits(chain)
+    numbers: list[float] = []
+    exponents = range(NEAREST, highest + STEP, STEP)
+    for exponent in exponents:
+        # Points of this entry are nearer than the next one's.
+        most = place.scale * 2.0 ** (exponent + STEP)
+        numbers += (next((each for each in reversed(begun) if each.reach >= most), begun[0])).numbers()
+    width = len(numbers) // len(exponents)
+    return (2.0 * NEAREST, float(len(exponents)), float(width), place.scale, *numbers)
+
+
+def begun_orbits(chain: Chain) -> tuple[Begun, ...]:
+    """Where orbits around a chain's place may begin, from the first to the last; each is as exact as those before it."""
+    place = chain.place
+    assert place is not None
+    depth = math.ceil(math.log2(place.magnification)) - NEAREST
+    depth += -depth % _SHARED_BITS
+    return _begun_orbits(replace(chain, place=None), place.exact, depth, place.applications)
+
+
+@lru_cache(maxsize=16)
+def _begun_orbits(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -> tuple[Begun, ...]:
+    try:
+        import mpmath
+    except ImportError:
+        raise FormulaError("needs mpmath: pip install 'clfractal[deep]'", Where(path="deep")) from None
+    with mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
+        point = [mpmath.mpf(part.numerator) / part.denominator for part in center]
+        return tuple(_begun(chain, point, 2.0**-depth, most))
+
+
+def _begun(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> Iterator[Begun]:
+    backend = JetBackend()
+    c = [_jet(each) for each in space_to_state(chain, list(map(coordinate_jet, center, range(3))), backend)]
+    beside = [_jet(each) for each in carried_at_start(chain, c, backend)]
+    state = [_jet(0.0)] * chain.size if chain.add == "point" else list(c)
+    state += beside
+    growth, least = 1.0, math.inf
+    first = int(chain.starts_counted)
+    for count in range(most + 1):
+        if count > first:
+            least = min(least, _straight(state, chain.size), backend.reach)
+            within = math.hypot(*(float(each.value) for each in state[: chain.size]))
+            if not (least >= nearest and within <= _WITHIN * chain.bailout):
+                return
+        if count >= first:
+            # (All orbits may begin at the first.)
+            values, slopes = (
+                tuple(float(each.value) for each in state),
+                np.array([each.slope for each in state]),
+            )
+            yield Begun(count, values, slopes, growth, math.inf if count == first else least)
+        bound = chain.link_at(count).bound
+        constant = [_jet(each) for each in constant_of(bound, c)]
+        new, names = applied(bound, state, constant, backend, number=count, carried=chain.carried)
+        if bound.derivative is not None and count >= first:
+            found = evaluate(bound.derivative, {**names, "dr": _jet(growth)}, backend)
+            growth = float(found.value if isinstance(found, Jet) else found)
+        state = [_jet(each) for each in new]
+
+
+def _straight(state: Sequence[Jet], size: int) -> float:
+    """How far around the place a state is straight enough."""
+    slopes = np.array([each.slope for each in state[:size]])
+    bends = np.array([full_bend(each.bend) for each in state[:size]])
+    if not (np.isfinite(slopes).all() and np.isfinite(bends).all()):
+        return 0.0
+    spread = np.linalg.svd(slopes, compute_uv=False)
+    if not spread[-1] > _FLAT * spread[0]:
+        return 0.0
+    # (Where second derivatives vanish by chance, those behind them are small over a small part of z.)
+    found = STRAIGHT / float(spread[0])
+    if bends.any():
+        off = float(np.linalg.norm(np.tensordot(np.linalg.pinv(slopes), bends, 1))) / 2
+        found = min(found, STRAIGHT / off) if off > 0 else found
+    for each in state[size:]:
+        bend, slope = float(np.linalg.norm(full_bend(each.bend))), float(np.linalg.norm(each.slope))
+        if bend > 0:
+            found = min(found, 2 * STRAIGHT * slope / bend)
+    return found
+
+
+def _jet(value: Any) -> Jet:
+    import mpmath
+
+    return value if isinstance(value, Jet) else constant_jet(mpmath.mpf(value))

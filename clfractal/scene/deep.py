@@ -1,0 +1,59 @@
+"""The scene's `deep`: a place of any depth that the scene shows, told exactly, and how much it is magnified."""
+
+from __future__ import annotations
+
+import re
+from fractions import Fraction
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, Field
+
+from clfractal.formulas.place import Place
+from clfractal.schema.base import Section, problem
+from clfractal.schema.fields import SCALE
+
+MOST_DIGITS = 1000
+"""Of a coordinate."""
+LARGEST = 1e6
+"""Of coordinates; that of other positions of a scene, too."""
+LARGEST_MAGNIFICATION = 1e120
+"""Squares of distances to the whole set, and of derivatives, are numbers of float64."""
+_DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?")
+
+
+def _decimal(value: Any) -> str:
+    """A number, or one in text, as text of the same value."""
+    if isinstance(value, bool) or not isinstance(value, (int, float, str)):
+        raise problem("must be a number, or one in quotes")
+    text = (repr(value) if not isinstance(value, str) else value).strip()
+    if len(text) > MOST_DIGITS + 10 or not _DECIMAL.fullmatch(text):
+        shown = f"{text[:40]!r}{'...' if len(text) > 40 else ''}"
+        raise problem(f"must be a decimal number of at most {MOST_DIGITS} digits, got {shown}")
+    if abs(Fraction(text)) > LARGEST:
+        raise problem(f"must be from {-LARGEST:,.0f} to {LARGEST:,.0f}, got {text[:40]}")
+    return text
+
+
+Decimal = Annotated[str, BeforeValidator(_decimal)]
+"""A number of any number of digits; in YAML in quotes, where it has more than 17."""
+ExactPosition = Annotated[tuple[Decimal, Decimal, Decimal], Field(strict=False)]
+
+
+class Deep(Section):
+    """A place of the formula's space that the scene shows, magnified.
+
+    The scene's origin is `center`, and what is one scene unit there is `magnification` of them in the picture. All else of
+    the scene, its camera, lights and objects, is told in the picture's units, as without it.
+    """
+
+    center: ExactPosition = Field(
+        ("0", "0", "0"),
+        description="the place in the formula's space; numbers of more than 17 digits stand in quotes",
+    )
+    magnification: Annotated[
+        float, Field(strict=True, ge=1, le=LARGEST_MAGNIFICATION, allow_inf_nan=False), SCALE
+    ] = Field(1.0, description="how many times larger it is shown")
+
+    def place(self, applications: int) -> Place:
+        """The place, as formulas know it; orbits have at most so many applications."""
+        return Place(self.center, self.magnification, applications)
