@@ -18,7 +18,7 @@ EXTENSIONS = (".yaml", ".yml")
 def import_scene(
     source: str, output: Path | None, look: str, formulas: Path | None, preset: str | None, shell: Shell
 ) -> None:
-    """Writes the scene of a file of another program, which was checked as every scene is.
+    """Writes the scene of a file of another program, which was checked as every scene is; pictures that it names go along.
 
     Args:
         output: the scene file; None: one of the same name in the current folder, which is not there yet.
@@ -32,6 +32,8 @@ def import_scene(
     # Here, as other commands do not need it.
     from clfractal.exchange.kinds import import_file
     from clfractal.scene.load import load_scene
+    from clfractal.scene.named_files import rename_files
+    from clfractal.viewer.named import carried, data_files
 
     if look not in LOOKS:
         raise FileError(unknown_name("look", look, LOOKS), Where("--look"))
@@ -41,12 +43,23 @@ def import_scene(
         raise FileError("exists already and is not replaced; name another file by -o", Where(str(path)))
     refuse_overwriting([path], [source])
     found = import_file(Path(source), next(each for each in LOOKS if each == look), formulas, preset)
+    folder = Path(source).parent
     try:
-        load_scene(found.scene)
+        scene = load_scene(found.scene, folder=folder)
     except ClfractalError as error:
         raise type(error)(error.message, Where(source, path=error.where.path)) from error
-    with atomic_writer(path) as beside:
-        beside.write_text(found.text(Path(source).name), encoding="utf-8")
+    along = carried(None, folder, data_files(scene), folder, path)
+    for part in ("environment", "materials"):
+        rename_files(found.scene.get(part), lambda file: along.names[file] or file)
+    along.copy()
+    try:
+        with atomic_writer(path) as beside:
+            beside.write_text(found.text(Path(source).name), encoding="utf-8")
+    except BaseException:
+        along.undo()
+        raise
+    for copy in along.made:
+        shell.say(f"{copy}: a picture that the scene names, from {folder}")
     for line in (*found.origins, *found.remarks):
         shell.say(f"{source}: {line}")
     shell.say(f"{path}: {_counted(len(found.remarks))} not taken over")

@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from clfractal.cli.pipes import refuse_stream
 from clfractal.errors import FileError, SceneError, Where
+from clfractal.exchange.program_folder import SHARED
 from clfractal.files.atomic import atomic_writer, check_output, naming
 from clfractal.files.document import write_document
 from clfractal.files.inputs import refuse_overwriting
@@ -183,6 +184,8 @@ class Moved:
                 rename_files(list((part.get(name) or {}).values()), self._from_there)
 
     def _from_there(self, file: str) -> str:
+        if file.startswith(SHARED):
+            return file
         whole = (self.base / file).resolve()
         try:
             return whole.relative_to(self.folder.resolve()).as_posix()

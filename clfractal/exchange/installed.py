@@ -12,15 +12,8 @@ from pathlib import Path
 from clfractal.errors import FileError, Where
 from clfractal.exchange.c_text import MAX_CHARACTERS, Statement, read_formula, without_comments
 from clfractal.exchange.numbers import NAMES
+from clfractal.exchange.program_folder import program_folder
 from clfractal.files.regular import read_bytes
-
-PLACES = (
-    "/usr/share/mandelbulber2",
-    "/usr/local/share/mandelbulber2",
-    "/Applications/mandelbulber2.app/Contents/Resources",
-    "C:/Program Files/Mandelbulber v2",
-)
-"""Where its installers put it."""
 
 _NOTHING = """
 7 10 61 71 72 76 82 85 87 88 89 90 95 98 99 100 101 103 104 105 106 107 108 109 110 111 112 113 114 115 117 122 130
@@ -75,7 +68,8 @@ class Installed:
 
 def find_installed() -> Installed | None:
     """The program that is installed; None if there is none."""
-    return next((Installed(Path(place)) for place in PLACES if (Path(place) / "formula").is_dir()), None)
+    folder = program_folder()
+    return None if folder is None else Installed(folder)
 
 
 @cache

@@ -14,6 +14,7 @@ from typing import Any, Literal
 
 from clfractal.exchange.mists import mist_of
 from clfractal.exchange.settings import Section, Settings
+from clfractal.exchange.surroundings import environment_of, lying_there
 
 Look = Literal["same", "ours"]
 LOOKS: tuple[Look, ...] = ("same", "ours")
@@ -48,10 +49,11 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
     lights = [*_main_light(main, camera, screen, everywhere), *_lamps(main, camera, screen)]
     ambient = _ambient(screen.amount(everywhere), lights, camera)
     material = _material(main, ambient, screen, remarks)
+    around = environment_of(settings, screen.amount, remarks)
     found: dict[str, Any] = {
         "lights": lights,
         "material": material,
-        "background": _background(main, camera, screen, remarks),
+        "background": _background(main, camera, screen),
         "renderer": {"samples": 4},
     }
     if "f_number" in camera:
@@ -61,16 +63,17 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
     if _occlusion(main) > 0:
         found["renderer"]["ambient_occlusion"] = {"rays": 4, "distance": _seen_height(camera)}
     for key, section in (
-        ("fog", _fog(main, screen, found["background"])),
+        ("fog", _fog(main, screen, found["background"], around)),
         ("glow", _glow(main, camera, screen)),
         ("mist", mist_of(main, screen.color, _behind(found), remarks)),
+        ("environment", around),
         ("objects", _limits(main)),
         ("output", _output(main, screen, remarks)),
     ):
         if section:
             found[key] = section
     if look == "ours":
-        _lit_by_ours(found)
+        _lit_by_ours(found, settings)
     return found
 
 
@@ -260,7 +263,7 @@ def _material(main: Section, ambient: float, screen: Screen, remarks: list[str])
     return found
 
 
-def _background(main: Section, camera: dict[str, Any], screen: Screen, remarks: list[str]) -> dict[str, Any]:
+def _background(main: Section, camera: dict[str, Any], screen: Screen) -> dict[str, Any]:
     """Their colours follow how far a ray points up; ours go from the top of the picture to its bottom."""
     first, second, third = (
         main.color(f"background_color_{number}", default)
@@ -268,8 +271,6 @@ def _background(main: Section, camera: dict[str, Any], screen: Screen, remarks: 
     )
     bright = main.number("background_brightness", 1.0)
     three = main.flag("background_3_colors_enable", True)
-    if main.flag("textured_background", False):
-        remarks.append("textured_background: the picture behind the set is not taken over")
 
     def seen(up: float) -> list[float]:
         part, ends = (abs(up), (second, first if up >= 0 else third)) if three else (0.0, (first, first))
@@ -283,14 +284,21 @@ def _background(main: Section, camera: dict[str, Any], screen: Screen, remarks: 
     return {"top": seen(above[2]), "bottom": seen(below[2])}
 
 
-def _fog(main: Section, screen: Screen, background: dict[str, Any]) -> dict[str, Any] | None:
-    """Fog on the way to the surface, and to where they look no farther: what is behind it is mixed with its colour here."""
+def _fog(
+    main: Section, screen: Screen, background: dict[str, Any], around: dict[str, Any] | None
+) -> dict[str, Any] | None:
+    """Fog on the way to the surface, and to where they look no farther: what is behind it is mixed with its colour here.
+
+    A picture behind it is there as it is, or not seen where more than half of it is fog.
+    """
     color = main.color("basic_fog_color", (0xE807, 0xEF12, 0xFFFF))
     visibility = main.number("basic_fog_visibility", 20.0)
     if not main.flag("basic_fog_enabled", False) or visibility <= 0:
         return None
     through = math.exp(-max(main.number("view_distance_max", 50.0), 0.0) / visibility)
     own = screen.color(color)
+    if around is not None and through < 0.5:
+        around["background"] = False
     for side, seen in background.items():
         background[side] = [round(through * a + (1 - through) * b, 6) for a, b in zip(seen, own, strict=True)]
     return {"color": own, "density": float(f"{min(1 / visibility, _LARGEST):.6g}"), "background": False}
@@ -345,13 +353,16 @@ def _output(main: Section, screen: Screen, remarks: list[str]) -> dict[str, Any]
     return found
 
 
-def _lit_by_ours(found: dict[str, Any]) -> None:
-    """Light along paths, of the sun and a sky, in place of theirs."""
+def _lit_by_ours(found: dict[str, Any], settings: Settings) -> None:
+    """Light along paths, of the sun and a sky or the picture behind the set, in place of theirs."""
     found["lighting"] = {"mode": "path", "bounces": 6}
     found["lights"] = [
         {**light, "angular_size": 3} if light.get("type") != "point" else light for light in found["lights"]
     ]
-    found["environment"] = {"name": "overcast", "background": False}
+    if "environment" in found:
+        del found["environment"]["rays"]
+    else:
+        found["environment"] = {"name": "overcast", "background": False, **lying_there(settings)}
     found["material"] |= {"ambient": 0, "diffuse": 1, "specular": 0, "reflection": 0}
     found["renderer"] = {"samples": 64}
     found["output"] = {**found.get("output", {}), "tone": "agx"}

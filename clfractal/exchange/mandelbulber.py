@@ -160,8 +160,6 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     placing = placing_of(settings)
     if placing is not None:
         place_around(scene, placing, (*solids, *limits))
-        if "environment" in scene:
-            remarks.append("fractal_rotation: the light of the sky does not turn with what is around the set")
     if materials:
         scene["materials"] = materials
     if is_mirrored(settings):

@@ -1,4 +1,8 @@
-"""Reading files that a scene names: they are beside it, and errors stand at the key that names them."""
+"""Reading files that a scene names: they are beside it, and errors stand at the key that names them.
+
+Pictures that come with another program stay where that has them: `mandelbulber:NAME` is one of the Mandelbulber 2 that is
+installed.
+"""
 
 from __future__ import annotations
 
@@ -8,8 +12,23 @@ from pathlib import Path
 
 from clfractal.device.activity import doing
 from clfractal.errors import FileError, Where
+from clfractal.exchange.program_folder import SHARED, pictures_folder
 from clfractal.files.inputs import note
 from clfractal.formulas.own import safe_path
+
+
+def place_of(file: str, folder: Path, where: Where) -> Path:
+    """The path of a file that a scene from `folder` names.
+
+    Raises:
+        FileError: at `where`: it is out of its folder, or that program is not installed.
+    """
+    if not file.startswith(SHARED):
+        return safe_path(file, folder, where)
+    shared = pictures_folder()
+    if shared is None:
+        raise FileError(f"is a picture of Mandelbulber 2, which is not installed: {file[:80]!r}", where)
+    return safe_path(file.removeprefix(SHARED), shared, where)
 
 
 @contextmanager
@@ -19,7 +38,7 @@ def reading_beside(file: str, folder: Path, where: Where) -> Iterator[Path]:
     Raises:
         FileError: at `where`, for a file out of the folder, or whatever is wrong with it.
     """
-    path = safe_path(file, folder, where)
+    path = place_of(file, folder, where)
     try:
         with doing(f"reading {path}"):
             yield path

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass
-from functools import cache, cached_property
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -14,7 +14,7 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.errors import SceneError, Where, unknown_name
 from clfractal.files import resources
-from clfractal.scene.beside import reading_beside
+from clfractal.scene.beside import reading_beside, state_of
 
 if TYPE_CHECKING:
     from clfractal.scene.lighting import Environment
@@ -73,11 +73,26 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
         with doing("making the sky"):
             return EnvironmentMap(bake(environment.sky), sun=sun_of(environment.sky))
     if environment.file is None:
-        return _shipped(environment.name or "")
+        found = _shipped(environment.name or "")
+    else:
+        with reading_beside(environment.file, folder, Where(path="environment.file")) as path:
+            found = EnvironmentMap(_read(path, environment.stretch, *state_of(path)))
+    if environment.is_upright and not environment.mirrored:
+        return found
+    # Most are upright.
+    from clfractal.scene.turned_maps import upright
+
+    with doing("turning the environment"):
+        return EnvironmentMap(upright(found.pixels, environment))
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, stretch: bool, changed: int, size: int) -> Floats:
     from clfractal.files.environment_map import read_environment
 
-    with reading_beside(environment.file, folder, Where(path="environment.file")) as path:
-        return EnvironmentMap(read_environment(path))
+    pixels = read_environment(path, stretch=stretch)
+    pixels.flags.writeable = False
+    return pixels
 
 
 @cache

@@ -13,6 +13,7 @@ from clfractal.schema.base import (
     Reflectance,
     Section,
     check_one_of,
+    problem,
     rule,
 )
 from clfractal.schema.fields import Usual
@@ -56,12 +57,17 @@ class Environment(Section):
 
     name: MapName | None = Field(None, description="an environment map that comes with the program")
     file: MapName | None = Field(
-        None, description="a latitude-longitude EXR or HDR picture, in the scene's folder or below"
+        None, description="a picture in latitude and longitude, in the scene's folder or below"
     )
     sky: Sky | None = Field(None, description="a physical sky")
     intensity: Annotated[Amount, Usual(0, 4)] = Field(1.0, description="factor on the environment's light")
     rotation: Annotated[float, Usual(-180, 180)] = Field(
-        0.0, ge=-360, le=360, description="rotation of the environment about the z axis, degrees"
+        0.0, ge=-360, le=360, description="rotation of the environment about `up`, degrees"
+    )
+    up: Direction = Field((0.0, 0.0, 1.0), description="where the picture's top is; a sky's is +z")
+    mirrored: bool = Field(False, description="true: left and right of the picture change places")
+    stretch: bool = Field(
+        False, description="true: a `file` of any shape is stretched; false: it is twice as wide as high"
     )
     background: bool = Field(
         True, description="true: visible behind the set; false: `background` is visible there"
@@ -75,9 +81,20 @@ class Environment(Section):
         """Whether the sun's disc stands before the map."""
         return self.sky is not None and self.sky.sun
 
+    @property
+    def is_upright(self) -> bool:
+        """Whether the picture's top is at +z, however long that direction is."""
+        return self.up[0] == self.up[1] == 0 and self.up[2] > 0
+
     @rule
     def _one_source(self) -> None:
         check_one_of(self, "name", "file", "sky")
+        if self.sky is not None and not self.is_upright:
+            raise problem("must be [0, 0, 1] with sky: its ground is level", "up")
+        if self.sky is not None and self.mirrored:
+            raise problem("cannot be combined with sky: turn that by sun_azimuth", "mirrored")
+        if self.stretch and self.file is None:
+            raise problem("needs a file", "stretch")
 
 
 class Scattering(Section):

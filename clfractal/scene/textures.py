@@ -54,6 +54,6 @@ def read_textures(materials: Mapping[str, PbrMaterial], folder: Path) -> dict[st
 def _read(path: Path, changed: int, size: int) -> Texture:
     from clfractal.files.texture import read_texture
 
-    pixels, has_codes = read_texture(path)
-    pixels.flags.writeable = False
-    return Texture(pixels, has_codes)
+    found = read_texture(path)
+    found.pixels.flags.writeable = False
+    return Texture(found.pixels, found.has_codes)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from clfractal.errors import ClfractalError, FileError, Where
+from clfractal.exchange.program_folder import SHARED
 from clfractal.files.atomic import atomic_writer
 from clfractal.files.document import read_document
 from clfractal.files.regular import read_bytes, read_text_file
@@ -121,8 +122,8 @@ class Carried:
 def carried(formula: Any, formula_folder: Path, data: list[str], data_folder: Path, target: Path) -> Carried:
     """Plans how the files that a scene names are reached from the file `target`; nothing is copied yet.
 
-    A file below the target's folder is named there. Any other is copied: under its own name, or under a free one if
-    another file has that.
+    A file below the target's folder is named there, and a picture of another program where that has it. Any other is
+    copied: under its own name, or under a free one if another file has that.
 
     Args:
         formula: the formula section as it was written, and the folder that its files are relative to.
@@ -134,7 +135,10 @@ def carried(formula: Any, formula_folder: Path, data: list[str], data_folder: Pa
     new = target.parent
     plan = Carried(target)
     for name in data:
-        plan.names[name] = _place(plan, name, _companions(data_folder, name), data_folder, new)
+        shared = name.startswith(SHARED)
+        plan.names[name] = (
+            name if shared else _place(plan, name, _companions(data_folder, name), data_folder, new)
+        )
     for name in _files_of(formula):
         inner = formula_files(_formula_in(name, formula_folder), formula_folder, depth=1)
         try:

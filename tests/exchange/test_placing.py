@@ -63,11 +63,12 @@ def test_what_is_around_a_turned_set() -> None:
     assert not any("fractal_" in remark for remark in found.remarks)
 
 
-def test_a_sky_that_does_not_turn_is_told() -> None:
-    text = settings(f"{CAMERA}\n{SPONGE}\n{TURNED}")
-    told = import_text(text, "x.fract", look="ours").remarks
-    assert [each for each in told if each.startswith("fractal_rotation: the light of the sky")]
-    assert not import_text(text, "x.fract").remarks
+@pytest.mark.parametrize("legacy", ["", "legacy_coordinate_system true;"])
+def test_the_sky_turns_with_what_is_around_the_set(legacy: str) -> None:
+    found = import_text(settings(f"{CAMERA}\n{SPONGE}\n{TURNED}\n{legacy}"), "x.fract", look="ours")
+    up = turn_of((-35, 62, 110)) @ [0, 0, 1]
+    np.testing.assert_allclose(found.scene["environment"]["up"], up * (1, 1, -1 if legacy else 1), atol=1e-6)
+    assert not found.remarks
 
 
 def test_a_set_that_stays_has_no_place_of_its_own() -> None:

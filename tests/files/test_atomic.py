@@ -224,7 +224,7 @@ def test_pictures(folder: Path, file: str) -> None:
     np.testing.assert_array_equal(read_exr(folder / file)[0]["R"], red)
     assert read_header(folder / file).values()["dataWindow"] == (0, 0, 7, 3)
     assert read_environment(folder / file).any()
-    assert read_texture(folder / file)[0].any()
+    assert read_texture(folder / file).pixels.any()
 
 
 def test_the_shell_s_outputs_and_inputs(folder: Path, clf: InProcess) -> None:

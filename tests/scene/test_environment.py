@@ -70,7 +70,7 @@ def test_a_map_beside_the_scene(folder: Path, file: str, value: float) -> None:
     cases(
         """
 file: none.exr => file: {0}/none.exr cannot be read: No such file or directory
-file: scene.yaml => file: {0}/scene.yaml is not an OpenEXR file
+file: scene.yaml => file: {0}/scene.yaml is not an EXR, HDR, PNG, JPEG, WebP, TIFF or BMP, or is damaged
 file: maps => file: {0}/maps is a folder, not a file
 file: ../secret.exr => file: must be a path inside the scene's folder, got '../secret.exr'
 file: /etc/passwd => file: must be a path inside the scene's folder, got '/etc/passwd'
@@ -95,7 +95,12 @@ def test_what_is_wrong_stands_at_its_line_and_column(folder: Path, environment: 
             (8, 4),
             "has 32 pixels of NaN, the first in column 0, row 0 (counted from 0 at the top left)",
         ),
-        (0.5, (8, 5), "must be twice as wide as high, as latitude-longitude maps are, got 8 x 5 pixels"),
+        (
+            0.5,
+            (8, 5),
+            "must be twice as wide as high, as latitude-longitude maps are, got 8 x 5 pixels"
+            "; stretch: true takes any shape",
+        ),
     ],
 )
 def test_a_bad_map_is_found_by_check(

@@ -150,6 +150,9 @@ lights: [{}, {type: point, position: §[0, 0.1, 0]}]
 material: {reflection: §1.5} => material.reflection: must be at most 1, got 1.5
 environment: §{intensity: 2} => environment: needs one of name, file or sky
 environment: {name: a, file: §b.exr} => environment.file: cannot be combined with name: give one of name, file or sky
+environment: {sky: {}, up: §[0, 1, 0]} => environment.up: must be [0, 0, 1] with sky: its ground is level
+environment: {sky: {}, mirrored: §true} => environment.mirrored: cannot be combined with sky: turn that by sun_azimuth
+environment: {name: studio, stretch: §true} => environment.stretch: needs a file
 environment: {file: b.exr, sky: §{}} => environment.sky: cannot be combined with file: give one of name, file or sky
 environment: {sky: {turbidity: §0.5}} => environment.sky.turbidity: must be at least 1, got 0.5
 environment: {sky: {§sun_azimut: 3}} => environment.sky: unknown key 'sun_azimut'; did you mean 'sun_azimuth'?

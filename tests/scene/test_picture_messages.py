@@ -39,7 +39,7 @@ materials: {m: {base: {weight: thick}}} => materials.m.base.weight: must be a nu
 materials: {m: {base: {color: {texture: none.png}}}}
 => materials.m.base.color.texture: none.png cannot be read: No such file
 materials: {m: {base: {color: {texture: text.png}}}}
-=> materials.m.base.color.texture: text.png is no picture, or a damaged one
+=> materials.m.base.color.texture: text.png is not an EXR, HDR, PNG, JPEG, WebP
 materials: {m: {base: {color: {texture: ../x.png}}}}
 => materials.m.base.color.texture: must be a path inside the scene's folder, got '../x.png'
 # Reliefs.

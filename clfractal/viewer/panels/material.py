@@ -173,9 +173,10 @@ def _map(ui: Ui) -> None:
         )
         return
     if environment.file is not None:
-        w.field(ui, "environment.file")
+        w.fields(ui, "environment", ("file", "stretch", "up", "mirrored"))
         return
     words, now, path = {name: w.word(name) for name in names()}, environment.name or "", "environment.name"
     found = w.pick(ui, "Map", words, now, path=path, tip=w.value_tip(ui, path), listed=True)
     if found is not None:
         w.put(ui, path, found)
+    w.fields(ui, "environment", ("up", "mirrored"))
