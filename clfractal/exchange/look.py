@@ -15,9 +15,13 @@ from typing import Any, Literal
 from clfractal.exchange.mists import mist_of
 from clfractal.exchange.settings import Section, Settings
 from clfractal.exchange.surroundings import environment_of, lying_there
+from clfractal.exchange.textures import textures_of
 
 Look = Literal["same", "ours"]
 LOOKS: tuple[Look, ...] = ("same", "ours")
+
+SURFACE = "the surface"
+"""The name of the set's material, where it shows pictures."""
 
 _CURVE = 2.2
 """About the exponent of sRGB's curve, for what may be above 1."""
@@ -72,8 +76,9 @@ def look_of(settings: Settings, camera: dict[str, Any], look: Look, remarks: lis
     ):
         if section:
             found[key] = section
+    on_surface = textures_of(main, "mat1_", look == "ours", remarks)
     if look == "ours":
-        _lit_by_ours(found, settings)
+        _lit_by_ours(found, settings, on_surface)
     return found
 
 
@@ -353,7 +358,7 @@ def _output(main: Section, screen: Screen, remarks: list[str]) -> dict[str, Any]
     return found
 
 
-def _lit_by_ours(found: dict[str, Any], settings: Settings) -> None:
+def _lit_by_ours(found: dict[str, Any], settings: Settings, on_surface: dict[str, Any]) -> None:
     """Light along paths, of the sun and a sky or the picture behind the set, in place of theirs."""
     found["lighting"] = {"mode": "path", "bounces": 6}
     found["lights"] = [
@@ -368,3 +373,6 @@ def _lit_by_ours(found: dict[str, Any], settings: Settings) -> None:
     found["output"] = {**found.get("output", {}), "tone": "agx"}
     found.pop("glow", None)
     found.pop("mist", None)
+    if on_surface:
+        found["materials"] = {SURFACE: {"specular": {"roughness": 0.3}, **on_surface}}
+        found["material"]["name"] = SURFACE

@@ -151,7 +151,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     scene |= view_of(settings, remarks)
     scene |= look_of(settings, scene["camera"], look, remarks)
     joined = joined_of(settings, installed, remarks)
-    solids, materials = solids_of(settings.main, len(joined), remarks)
+    solids, materials = solids_of(settings.main, len(joined), look == "ours", remarks)
     # Solids come after the formulas, which may cut each other; what joins all before it is cut to the limits in the end.
     limits = scene.pop("objects", {})
     objects = {**joined, **solids, **limits}
@@ -161,7 +161,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     if placing is not None:
         place_around(scene, placing, (*solids, *limits))
     if materials:
-        scene["materials"] = materials
+        scene.setdefault("materials", {}).update(materials)
     if is_mirrored(settings):
         mirror(scene)
     _hollow_out(scene, settings, installed)

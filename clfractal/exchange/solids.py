@@ -10,6 +10,7 @@ from clfractal.exchange.parameters import rotation
 from clfractal.exchange.placing import angles_of, reach_from
 from clfractal.exchange.settings import Section
 from clfractal.exchange.solid_formulas import MOST_FORMULAS, Wanted, as_formula, can_be_formula, size_of
+from clfractal.exchange.textures import textures_of
 
 MOST = 64
 """Objects of a scene."""
@@ -21,11 +22,14 @@ _GREY = (0xC350, 0xC350, 0xC350)
 Vector = tuple[float, ...]
 
 
-def solids_of(main: Section, joined: int, remarks: list[str]) -> tuple[dict[str, Any], dict[str, Any]]:
+def solids_of(
+    main: Section, joined: int, along_paths: bool, remarks: list[str]
+) -> tuple[dict[str, Any], dict[str, Any]]:
     """The sections `objects` and `materials` of a scene.
 
     Args:
         joined: how many other objects are formulas.
+        along_paths: whether the scene has light along paths.
 
     Raises:
         FileError: a value is none of its kind.
@@ -46,7 +50,8 @@ def solids_of(main: Section, joined: int, remarks: list[str]) -> tuple[dict[str,
         name = f"material {main.whole(key + 'material_id', 1)}"
         if name != "material 1" or f"{key}color" in main.entries:
             name = name if f"{key}color" not in main.entries else f"{kind} {number}"
-            materials[name] = _material(main, key, name)
+            if name not in materials:
+                materials[name] = _material(main, key, name, along_paths, remarks)
             found["material"] = name
         wanted = _wanted(main, key, found)
         if can_be_formula(found) and not wanted.is_plain:
@@ -100,16 +105,17 @@ def _enabled(main: Section) -> Iterable[tuple[str, int]]:
     return sorted(found)
 
 
-def _material(main: Section, key: str, name: str) -> dict[str, Any]:
+def _material(main: Section, key: str, name: str, along_paths: bool, remarks: list[str]) -> dict[str, Any]:
     """One of theirs by its number; in old files each solid has its own colour and reflection."""
     before = f"mat{name.rpartition(' ')[2]}_" if name.startswith("material") else ""
     color = main.color(f"{before}surface_color" if before else f"{key}color", _GREY)
     mirrors = main.number(f"{before}reflectance" if before else f"{key}reflection", 0.0)
+    shown = textures_of(main, before, along_paths, remarks) if before else {}
     main.without(main.beginning(before) if before else ())
-    base: dict[str, Any] = {"color": decoded(color)}
+    base: dict[str, Any] = {"color": decoded(color), **shown.pop("base", {})}
     if mirrors >= 0.5:
-        return {"base": {**base, "metalness": 1}, "specular": {"roughness": 0}}
-    return {"base": base, "specular": {"roughness": 0.3}}
+        return {"base": {**base, "metalness": 1}, "specular": {"roughness": 0}, **shown}
+    return {"base": base, "specular": {"roughness": 0.3}, **shown}
 
 
 def _placed(main: Section, key: str, kind: str, along: float = 0.0, **numbers: Any) -> dict[str, Any]:

@@ -19,9 +19,9 @@ from clfractal.exchange.settings import Section, Settings
 from clfractal.exchange.view import is_mirrored
 from clfractal.files.map_directions import Doubles, lying
 
-_SHARED_DIR = "$SHARED_DIR/"
-_DEFAULT = f"{_SHARED_DIR}textures/background.jpg"
-_TEXTURES = "textures"
+SHARED_DIR = "$SHARED_DIR/"
+_DEFAULT = f"{SHARED_DIR}textures/background.jpg"
+TEXTURES = "textures"
 _MAPPINGS = ("equirectangular", "double hemisphere", "flat")
 _LONGEST = 500
 
@@ -109,11 +109,11 @@ def picture_named(text: str, folder: Path) -> str | None:
     among the pictures of the program that is installed.
     """
     path = PurePosixPath(text.replace("\\", "/"))
-    shared = text.startswith(_SHARED_DIR)
+    shared = text.startswith(SHARED_DIR)
     name = path.name
     if not name or len(text) > _LONGEST or not text.isprintable():
         return None
-    beside = [PurePosixPath(name), PurePosixPath(_TEXTURES) / name]
+    beside = [PurePosixPath(name), PurePosixPath(TEXTURES) / name]
     if not (shared or path.is_absolute() or ".." in path.parts or ":" in path.parts[0]):
         beside.insert(0, path)
     installed = pictures_folder()

@@ -18,28 +18,17 @@ from clfractal.exchange.surroundings import picture_named
 from clfractal.files.map_directions import in_picture
 from clfractal.scene.load import load_scene
 from tests.exchange.files import settings
+from tests.exchange.pictures import install, picture
 from tests.shell import InProcess
 
 CAMERA = "camera 0 -5 0;\ntarget 0 0 0;\ncamera_top 0 0 1;\nfov 1;\nformula_1 7;\nN 3;\nimage_width 16;\nimage_height 12;"
 TEXTURED = f"{CAMERA}\ntextured_background true;"
 
 
-def picture(path: Path, code: tuple[int, int, int] = (200, 100, 50), size: tuple[int, int] = (8, 4)) -> Path:
-    """A picture of one colour."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    Image.new("RGB", size, code).save(path)
-    return path
-
-
 @pytest.fixture(autouse=True)
-def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+def installed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A program with two pictures."""
-    folder = tmp_path / "program"
-    (folder / "formula").mkdir(parents=True)
-    for name in ("background.jpg", "sea.png"):
-        picture(folder / "textures" / name)
-    monkeypatch.setattr(program_folder, "PLACES", (str(folder),))
-    return folder
+    install(tmp_path / "program", monkeypatch, ("background.jpg", "sea.png"))
 
 
 @pytest.fixture
