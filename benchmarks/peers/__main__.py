@@ -3,8 +3,8 @@
     python -m benchmarks.peers [FILE ...] [--only WORD] [--sample N --seed S] [--again [VERDICT]] [--jobs N] [-o FILE.json]
 
 A line for each file: the part of the picture that it covers (theirs), intersection over union of both silhouettes, relative
-differences of depth in the middle and at nine tenths, and what is wrong. What was found is kept in a file, and not
-measured again without `--again`.
+differences of depth in the middle and at nine tenths, and what is wrong. Of files with a ~ water is compared flat: their
+waves are others. What was found is kept in a file, and not measured again without `--again`.
 """
 
 from __future__ import annotations
@@ -123,7 +123,8 @@ def line(name: str, record: dict[str, Any]) -> str:
         cells.append(f"{'-' if value is None else f'{100 * value:.{digits}f}':>{width}}")
     why = record.get("error") or ", ".join(record.get("dropped") or record.get("habits", ()))
     word = verdict(record)
-    return f"{' '.join(cells)}  {word}" + (f": {why}" if why and word != "alike" else "")
+    mark = "~" if record.get("calm") else " "
+    return f"{' '.join(cells)} {mark}{word}" + (f": {why}" if why and word != "alike" else "")
 
 
 if __name__ == "__main__":

@@ -105,6 +105,9 @@ def summary(records: Sequence[dict[str, object]]) -> list[str]:
             f" middle, {_share(sum(m <= NINTH for m in ninths), len(ninths))} within 5 % at nine tenths;"
             f" median file {100 * float(np.median(middles)):.2f} % and {100 * float(np.median(ninths)):.2f} %"
         )
+    calm = sum(bool(each.get("calm")) for each in measured)
+    if calm:
+        lines.append(f"~ {calm} with water, which is compared without its waves")
     counts: dict[str, int] = {}
     for each in records:
         word = verdict(each)

@@ -27,12 +27,14 @@ def record(path: Path, side: int, seconds: float, keep: Path | None = None) -> d
     found: dict[str, Any] = {"stage": "open", "error": None, "dropped": [], "habits": []}
     try:
         scene, settings = ours.read(path)
-        found |= {"dropped": causes.dropped(scene), "habits": causes.habits(settings)}
+        calm = ours.calm_waters(scene)
+        found |= {"dropped": causes.dropped(scene), "habits": causes.habits(settings), "calm": bool(calm)}
         bare = ours.bare(scene, side)
         found["stage"] = "theirs"
         rays, eye = ours.rays(bare, side, mirrored=is_mirrored(settings), placing=placing_of(settings))
         start = time.perf_counter()
-        seen = theirs.depths(path, settings.main, side, rays, eye, seconds)
+        numbers = [int(name.rpartition(" ")[2]) for name in calm]
+        seen = theirs.depths(path, settings.main, side, rays, eye, seconds, numbers)
         found["theirs_s"] = round(time.perf_counter() - start, 2)
         found["stage"] = "ours"
         start = time.perf_counter()

@@ -30,6 +30,18 @@ def read(path: Path) -> tuple[Imported, Settings]:
     return imported(read_settings(path)), read_settings(path)
 
 
+def calm_waters(found: Imported) -> list[str]:
+    """The names of waters that are compared without waves, which are others in ours: those that the eye is above then."""
+    eye = np.array(found.scene["camera"]["position"])
+
+    def is_below(water: dict[str, Any]) -> bool:
+        up = np.array(water.get("normal", (0, 0, 1)), float)
+        return float(up @ (eye - water["position"])) > 0
+
+    objects = found.scene.get("objects", {})
+    return [name for name, each in objects.items() if each["type"] == "water" and is_below(each)]
+
+
 def bare(found: Imported, side: int) -> Scene:
     """The scene of one sample to a pixel and no light, whose first `side` columns and rows have the other program's rays.
 
@@ -42,8 +54,10 @@ def bare(found: Imported, side: int) -> Scene:
     camera = {key: data["camera"][key] for key in ("position", "target", "up", "fov")}
     half = math.tan(math.radians(camera["fov"] / 2)) * (side + 1) / side
     camera["fov"] = math.degrees(2 * math.atan(half))
+    calm = calm_waters(found)
     objects = {
         name: {key: value for key, value in each.items() if key != "material"}
+        | ({"waves": {"height": 0}} if name in calm else {})
         for name, each in data.get("objects", {}).items()
     }
     data |= {

@@ -10,6 +10,7 @@ import os
 import shutil
 import subprocess
 import tempfile
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -29,6 +30,8 @@ THINNER = 20
 """The same of surfaces whose thickness a file says: finer ones take minutes."""
 LARGER = 2
 """How much larger pictures are of surfaces that theirs find by steps of a pixel, whatever else a file says."""
+STEPS = 0.25
+"""Their steps, as a part of those that a file chooses: theirs pass through what is thin."""
 _NOTHING = 65535
 _LEAST = 1e-4
 """Depths below this cannot be told: places have steps of 1.5e-5."""
@@ -119,13 +122,16 @@ def picture(
         raise TheirsError("theirs wrote no picture")
 
 
-def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seconds: float) -> Depths:
+def depths(
+    path: Path, main: Section, side: int, rays: Floats, eye: Floats, seconds: float, calm: Iterable[int] = ()
+) -> Depths:
     """Where their rays meet the surface.
 
     Args:
         main: the file's settings, for how fine its surface is.
         rays: directions of length 1 through their pixels, shape (side, side, 3), as they have space.
         eye: where rays begin, shape (3,).
+        calm: the numbers of waters without waves.
 
     Raises:
         TheirsError: it made no picture, or took too long.
@@ -136,7 +142,9 @@ def depths(path: Path, main: Section, side: int, rays: Floats, eye: Floats, seco
     asked["detail_level"] = FINER * main.number("detail_level", 1.0)
     if main.flag("constant_DE_threshold", False):  # which does not follow the level
         asked["DE_thresh"] = main.number("DE_thresh", 0.01) / THINNER
+    asked["DE_factor"] = STEPS * main.number("DE_factor", 1.0)
     asked |= {f"mat{number}_transparency_of_surface": 0 for number in range(1, 10)}
+    asked |= {f"primitive_water_{number}_relative_amplitude": 0 for number in calm}
     with tempfile.TemporaryDirectory(prefix="peers-") as folder:
         output = Path(folder, "picture.png")
         each = LARGER if main.flag("iteration_threshold_mode", False) else 1

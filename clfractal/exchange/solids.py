@@ -182,8 +182,10 @@ def _plane(main: Section, key: str) -> dict[str, Any]:
 
 def _water(main: Section, key: str) -> dict[str, Any]:
     length = _size(main, key + "length", 0.1)
-    height = length * max(main.number(key + "relative_amplitude", 0.2), 0.0)
-    main.without(key + name for name in ("amplitude", "iterations", "anim_speed", "wave_from_objects_enable"))
+    # (Old files give it in scene units.)
+    usual = main.number(key + "amplitude", 0.2 * length) / length
+    height = length * max(main.number(key + "relative_amplitude", usual), 0.0)
+    main.without(key + name for name in ("iterations", "anim_speed", "wave_from_objects_enable"))
     return {**_flat(main, key, "water"), "waves": {"height": height, "length": length}}
 
 

@@ -13,7 +13,8 @@ from benchmarks.peers import __main__ as peers
 from benchmarks.peers import causes, ours, theirs
 from benchmarks.peers.compare import likeness, outlines
 from benchmarks.peers.one import record
-from clfractal.exchange.mandelbulber import Imported
+from clfractal.exchange.mandelbulber import Imported, import_text
+from clfractal.scene.objects import WaterObject
 from tests.exchange.files import settings
 
 # Squaring, of which the Julia set of 0 is the ball of radius 1.
@@ -171,6 +172,41 @@ def test_our_rays_are_theirs(tmp_path: Path) -> None:
     np.testing.assert_allclose(rays[12, 12], forward / np.linalg.norm(forward), atol=1e-12)
     top = rays[0, 12] / (rays[0, 12] @ rays[12, 12]) - rays[12, 12]
     assert np.linalg.norm(top) == pytest.approx(0.45)
+
+
+def _over_water(height: float) -> str:
+    water = f"primitive_water_1_enabled true;\nprimitive_water_1_length 4;\nprimitive_water_1_position 0 0 {height};"
+    return BALL.replace("formula_1", f"{water}\nformula_1")
+
+
+def test_water_is_compared_flat_where_the_eye_is_above_it() -> None:
+    above, below = (import_text(_over_water(height)) for height in (-0.4, 0.7))
+    assert ours.calm_waters(above) == ["water 1"]
+    assert ours.calm_waters(below) == []
+    for found, height in ((above, 0), (below, 0.8)):
+        water = ours.bare(found, 24).objects["water 1"]
+        assert isinstance(water, WaterObject)
+        assert water.waves.height == pytest.approx(height)
+
+
+def test_files_with_flat_water_have_a_mark() -> None:
+    good = {"stage": "done", "dropped": [], "covered": 0.5, "union": 1, "middle": 0, "ninth": 0, "calm": True}
+    assert peers.line("a", good).endswith(" ~alike")
+    assert peers.line("a", good | {"calm": False}).endswith("  alike")
+    assert sum(line.startswith("~ 1 ") for line in causes.summary([good])) == 1
+
+
+@pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")
+def test_flat_water_in_both_programs(tmp_path: Path) -> None:
+    path = tmp_path / "water.fract"
+    path.write_text(_over_water(-0.4), encoding="utf-8")
+    found = record(path, 48, 100, tmp_path)
+    assert found["calm"]
+    assert causes.verdict(found) == "alike"
+    kept = np.load(tmp_path / "water.npz")
+    rays, eye = ours.rays(ours.bare(ours.read(path)[0], 48), 48, mirrored=False)
+    deep = rays[40:, :, 2]  # the rows where nothing else is
+    np.testing.assert_allclose(kept["theirs"][40:], -(eye[2] + 0.4) / deep, rtol=3e-4)
 
 
 @pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from decimal import Decimal
+from fractions import Fraction
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +11,7 @@ import pytest
 
 from benchmarks.peers import causes, theirs
 from benchmarks.peers.one import record
+from clfractal.camera.views import scene_view
 from clfractal.elements.shapes.box import BoxObject
 from clfractal.exchange.mandelbulber import import_text
 from clfractal.exchange.parameters import rotation
@@ -40,6 +43,28 @@ def turn_of(angles: tuple[float, float, float]) -> np.ndarray:
         about[[one, one, other, other], [one, other, one, other]] = c, -s, s, c
         found = about @ found
     return found
+
+
+@pytest.mark.parametrize("more", ["", f"{TURNED}\n"])
+def test_a_target_close_to_the_camera(more: str) -> None:
+    # Deep zooms have targets nearer than 1e-13, where the plane that rays go through would be rounded to parts of pixels.
+    camera, target = [Fraction(each) for each in ("2.375", "-1.25", "2.625")], []
+    for each, away in zip(camera, (-3, 5, 2), strict=True):
+        target.append(each + Fraction(away, 2**46))
+    keys = "".join(
+        f"{key} {' '.join(str(Decimal(each.numerator) / each.denominator) for each in place)};\n"
+        for key, place in (("camera", camera), ("target", target))
+    )
+    found = import_text(settings(f"{keys}camera_top 0.1 0.2 1;\nfov 0.9;\n{more}{SPONGE}"), "x.fract")
+    view = scene_view(load_scene(found.scene))
+    turn = turn_of((-35, 62, 110)) if more else np.eye(3)
+    forward = turn @ (np.array([-3, 5, 2]) / np.sqrt(38))
+    assert view.eye is not None
+    steps = np.linspace(0, view.width, 100)
+    places = view.center + steps[:, None] * view.side - view.eye
+    across = places / (places @ forward)[:, None] - forward
+    np.testing.assert_allclose(across @ forward, 0, atol=1e-8)
+    np.testing.assert_allclose(across, np.linspace(0, 1.2, 100)[:, None] * view.side, atol=1e-8)
 
 
 def test_what_is_around_a_turned_set() -> None:
