@@ -9,6 +9,7 @@ from typing import Any
 
 from clfractal.errors import FileError, Where
 from clfractal.exchange.colors import coloring_of
+from clfractal.exchange.hollows import take_their_distance
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
 from clfractal.exchange.measure import are_inside, ball_of
@@ -164,7 +165,7 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
         scene.setdefault("materials", {}).update(materials)
     if is_mirrored(settings):
         mirror(scene)
-    _hollow_out(scene, settings, installed)
+    take_their_distance(scene, settings, installed)
     move_counts(scene)
     _leave_out_lamps(scene, remarks)
     _end_rays(scene, settings.main)
@@ -205,25 +206,6 @@ def _folds_of(section: dict[str, Any] | str) -> str | None:
     members = [each["inline"] for each in inline.get("chain", [section]) if "inline" in each]
     name = carried_name(COLOR)
     return name if any(name in each.get("state", {}) for each in members) else None
-
-
-_SOLID = ("limits_enabled", "iteration_threshold_mode", "interior_mode")
-"""Keys with which what does not escape is a solid."""
-
-
-def _hollow_out(scene: dict[str, Any], settings: Settings, installed: Installed | None) -> None:
-    """Where the eye is among what does not escape, theirs take surfaces to be where their distances end."""
-    section = scene["formula"]
-    if section == "none" or "inline" not in section or any(settings.main.flag(key, False) for key in _SOLID):
-        return
-    members = [each["inline"] for each in section["inline"].get("chain", [section])]
-    known = any("distance" in each for each in members)
-    if known or not are_inside(section, [scene["camera"]["position"]])[0]:
-        return
-    powers = any(each["degree"] >= 2 for each in members)
-    scene["formula"] = formula_of(settings, installed, [], hollow=powers)
-    # (Texts that were read again are told once.)
-    settings.origins[:] = dict.fromkeys(settings.origins)
 
 
 def _end_rays(scene: dict[str, Any], main: Section) -> None:

@@ -7,6 +7,8 @@ from typing import Any
 
 DIRECTIONS = 400
 NEAREST, FARTHEST, STEP = 0.05, 120.0, 1.12
+BESIDE = 24
+"""Places beside each axis at each radius."""
 LOOKED_AT = 12
 """Applications after which a place is taken to be inside."""
 GONE = 1000.0
@@ -67,6 +69,20 @@ def are_inside(section: dict[str, Any], points: Sequence[Sequence[float]]) -> li
     with np.errstate(all="ignore"):
         _, inside = escape(resolve(section), np.array(points, float), int(section["iterations"]))
     return [bool(each) for each in inside]
+
+
+def distance_at(section: dict[str, Any], place: Sequence[float]) -> float:
+    """The distance of a place from the set of a scene's section `formula`, as a march would find it."""
+    import numpy as np
+
+    from clfractal.formulas.catalog import resolve
+    from clfractal.formulas.reference import distance, own_distance
+
+    chain, count, places = resolve(section), int(section["iterations"]), np.array([place], float)
+    found = (
+        distance(chain, places, count)[0] if chain.rule_index is None else own_distance(chain, places, count)
+    )
+    return float(found[0])
 
 
 def is_ball(section: dict[str, Any]) -> bool:
@@ -159,12 +175,32 @@ def _radius(
     count = round(np.log(FARTHEST / NEAREST) / np.log(STEP))
     radii = NEAREST * STEP ** np.arange(count)
     points = (radii[:, None, None] * directions[None, :70]).reshape(-1, 3)
+    applications = min(max(applications, last + 2), 40)
     with np.errstate(all="ignore"):
-        _, inside = escape(chain, points, min(max(applications, last + 2), 40))
+        _, inside = escape(chain, points, applications)
     halves = np.array([length / 2 if length > 0 else np.inf for length in repeats])
     inside &= np.all(abs(points) <= halves, axis=1)
-    kept = inside.reshape(count, -1).any(axis=1)
+    kept = inside.reshape(count, -1).any(axis=1) | _along_axes(chain, radii, applications, halves)
     if not kept.any():
         return 4.0
     largest = float(radii[np.nonzero(kept)[0].max()])
     return max(1.4 * largest, 0.5)
+
+
+def _along_axes(chain: Any, radii: Any, applications: int, halves: Any) -> Any:
+    """Of each radius, whether what is near an axis there stays: rows that a transform repeats go on without an end."""
+    import numpy as np
+
+    from clfractal.formulas.reference import escape
+
+    generator = np.random.default_rng(2)
+    found = np.zeros(len(radii), bool)
+    for axis in range(3):
+        points = generator.uniform(-1, 1, (len(radii), BESIDE, 3))
+        # Repeats have lengths; which part of one a radius meets is anywhere.
+        points[..., axis] = radii[:, None] * generator.uniform(1 / STEP, 1, (len(radii), BESIDE))
+        points[:, ::2, axis] *= -1
+        with np.errstate(all="ignore"):
+            _, inside = escape(chain, points.reshape(-1, 3), applications)
+        found |= (inside.reshape(points.shape[:2]) & np.all(abs(points) <= halves, axis=2)).any(axis=1)
+    return found

@@ -83,7 +83,9 @@ class Section:
         return self.numbers(key, (default,))[0]
 
     def vector(self, key: str, default: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> tuple[float, ...]:
-        """Three numbers."""
+        """Three numbers; one is that of all, as old files have it."""
+        if len(self.text(key).split()) == 1:
+            default = (self.numbers(key, default)[0],) * 3
         return self.numbers(key, default)
 
     def whole(self, key: str, default: int) -> int:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterable
 from typing import Any
 
@@ -16,6 +17,10 @@ MOST = 64
 """Objects of a scene."""
 _FLAT = 1e-4
 """How thick what has no thickness is, as a part of its size."""
+_HIGHER, _LONGER = 2.7, 6.0
+"""Our waves' height and length by their amplitude and length: as high and steep as in pictures of 40 of their lengths."""
+_LOW, _LONG = 1e-4, 1e6
+"""Of planes that are discs: heights of the eye above them, as parts of how far rays go, and how far that may be."""
 _BEGIN = "primitive_"
 _GREY = (0xC350, 0xC350, 0xC350)
 
@@ -177,7 +182,18 @@ def _rectangle(main: Section, key: str) -> dict[str, Any]:
 
 
 def _plane(main: Section, key: str) -> dict[str, Any]:
-    return _flat(main, key, "plane")
+    """A disc that ends where their rays do, and is seen as its horizon; a plane, where the eye is not above it."""
+    up = rotation(main.vector(key + "rotation"))[2]
+    eye, place = main.vector("camera", (3, -6, 2)), main.vector(key + "position")
+    height = sum(n * (a - b) for n, a, b in zip(up, eye, place, strict=True))
+    farthest = main.number("view_distance_max", 50.0)
+    if main.flag("limits_enabled", False) or not _LOW * farthest < height < farthest < _LONG:
+        return _flat(main, key, "plane")
+    radius = math.sqrt(farthest * farthest - height * height)
+    thickness = _FLAT * radius
+    found = _placed(main, key, "cylinder", radius=radius, height=thickness)
+    found["position"] = [a - (height + thickness / 2) * b for a, b in zip(eye, up, strict=True)]
+    return found
 
 
 def _water(main: Section, key: str) -> dict[str, Any]:
@@ -186,7 +202,12 @@ def _water(main: Section, key: str) -> dict[str, Any]:
     usual = main.number(key + "amplitude", 0.2 * length) / length
     height = length * max(main.number(key + "relative_amplitude", usual), 0.0)
     main.without(key + name for name in ("iterations", "anim_speed", "wave_from_objects_enable"))
-    return {**_flat(main, key, "water"), "waves": {"height": height, "length": length}}
+    waves = {"height": _rounded(_HIGHER * height), "length": _rounded(_LONGER * length)}
+    return {**_flat(main, key, "water"), "waves": waves}
+
+
+def _rounded(value: float) -> float:
+    return float(f"{value:.6g}")
 
 
 def _size(main: Section, key: str, default: float = 1.0) -> float:

@@ -11,10 +11,10 @@ import pytest
 from benchmarks.peers import causes, theirs
 from benchmarks.peers.one import record
 from clfractal.exchange.ends import ending
-from clfractal.exchange.mandelbulber import import_settings
+from clfractal.exchange.mandelbulber import import_settings, import_text
 from clfractal.formulas.catalog import resolve
 from clfractal.formulas.reference import own_distance
-from tests.exchange.files import settings
+from tests.exchange.files import program, settings
 
 FOLDED: dict[str, Any] = {
     "title": "Folds and an inversion",
@@ -82,6 +82,51 @@ def test_halls_in_both_programs(tmp_path: Path) -> None:
     found = record(path, 48, 100)
     assert causes.verdict(found) == "alike", found
     assert found["ninth"] < 0.01
+
+
+POWER = """REAL4 OwnIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	aux->DE = aux->DE * 2.0f * aux->r;
+	return (REAL4){z.x * z.x - z.y * z.y - z.z * z.z, 2.0f * z.x * z.y, 2.0f * z.x * z.z, z.w};
+}
+"""
+
+
+@pytest.mark.parametrize(("count", "known"), [(5, True), (8, True), (9, False)])
+def test_after_few_applications_of_a_power_their_distance_is_the_surface(
+    count: int, known: bool, tmp_path: Path
+) -> None:
+    """Squares of a point: what is nearer than 1 has a distance of 0; after 5 the ball of what has not left is larger."""
+    folder = program(tmp_path, benesi_pine_tree=POWER)
+    keys = f"formula_1 66;\nN {count};\njulia_mode true;\ncamera 4 -7 3;\ntarget 0 0 0;\ncamera_top 0 0 1;"
+    section = import_text(settings(keys), "x.fract", formulas=folder).scene["formula"]
+    chain = resolve(section)
+    assert (chain.rule_index is not None) is known
+    if known:
+        found = own_distance(chain, np.array([[0.97, 0, 0], [1.05, 0, 0]]), section["iterations"])
+        assert found[0] == 0
+        assert found[1] == pytest.approx(0.5 * 1.05 * np.log(1.05))
+
+
+TENT = """REAL4 OwnIteration(REAL4 z, __constant sFractalCl *fractal, sExtendedAuxCl *aux)
+{
+	aux->DE = aux->DE * GROWN;
+	return (REAL4){3.0f - 3.0f * fabs(z.x), 0.5f * z.y, 0.5f * z.z, z.w};
+}
+"""
+
+
+@pytest.mark.parametrize(("grown", "eye", "known"), [(1.5, 1e-9, True), (3, 1e-9, False), (1.5, 0.2, False)])
+def test_an_eye_in_dust_that_their_distance_does_not_see(
+    grown: float, eye: float, known: bool, tmp_path: Path
+) -> None:
+    """Of x -> 3 - 3 |x| the place 0.75 stays, among dust; the text tells how fast distances grow, or half of it."""
+    folder = program(tmp_path, benesi_pine_tree=TENT.replace("GROWN", f"{float(grown)}f"))
+    keys = (
+        f"formula_1 66;\njulia_mode true;\ncamera {0.75 + eye!r} 0.4 0.1;\ntarget 0 0 0;\ncamera_top 0 0 1;"
+    )
+    section = import_text(settings(keys), "x.fract", formulas=folder).scene["formula"]
+    assert (resolve(section).rule_index is not None) is known
 
 
 @pytest.mark.skipif(not theirs.is_there(), reason="Mandelbulber 2 is not installed")

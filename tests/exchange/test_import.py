@@ -446,17 +446,17 @@ class TestSolids:
             "cone 1": {"type": "cone", "position": [0, 0, 1], "radius": 1, "height": 2},
             "rectangle 1": {"type": "box", "position": [0, 0, 0], "size": [3, 1, 4e-4]},
             "sphere 1": {"type": "sphere", "position": [3, 0, 0], "radius": 1},
-            "water 1": {"type": "water", "position": [0, 0, 0], "waves": {"height": 0.1, "length": 0.5}},
+            "water 1": {"type": "water", "position": [0, 0, 0], "waves": {"height": 0.27, "length": 3}},
         }
         assert scene.materials["material 2"].base.color == (1, 0, 0)
         assert found.remarks == ("primitive_prism_1_enabled: there is no prism among our objects",)
 
     def test_waves_of_old_files_have_a_height_in_scene_units(self) -> None:
         water = "primitive_water_1_enabled true;\nprimitive_water_1_length 8;\n"
-        for key, height in (("", 1.6), ("amplitude 0.5", 0.5), ("relative_amplitude 0.05", 0.4)):
+        for key, amplitude in (("", 1.6), ("amplitude 0.5", 0.5), ("relative_amplitude 0.05", 0.4)):
             more = f"primitive_water_1_{key};" if key else ""
             found = imported(f"{CAMERA}\n{water}{more}")
-            assert found.scene["objects"]["water 1"]["waves"]["height"] == pytest.approx(height)
+            assert found.scene["objects"]["water 1"]["waves"]["height"] == pytest.approx(2.7 * amplitude)
             assert found.remarks == ()
 
     def test_a_rotation_turns_as_their_matrix_does(self) -> None:

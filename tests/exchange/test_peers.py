@@ -183,7 +183,7 @@ def test_water_is_compared_flat_where_the_eye_is_above_it() -> None:
     above, below = (import_text(_over_water(height)) for height in (-0.4, 0.7))
     assert ours.calm_waters(above) == ["water 1"]
     assert ours.calm_waters(below) == []
-    for found, height in ((above, 0), (below, 0.8)):
+    for found, height in ((above, 0), (below, 2.16)):
         water = ours.bare(found, 24).objects["water 1"]
         assert isinstance(water, WaterObject)
         assert water.waves.height == pytest.approx(height)

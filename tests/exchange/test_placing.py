@@ -13,6 +13,7 @@ from benchmarks.peers import causes, theirs
 from benchmarks.peers.one import record
 from clfractal.camera.views import scene_view
 from clfractal.elements.shapes.box import BoxObject
+from clfractal.elements.shapes.cylinder import CylinderObject
 from clfractal.exchange.mandelbulber import import_text
 from clfractal.exchange.parameters import rotation
 from clfractal.exchange.placing import placing_of
@@ -74,9 +75,14 @@ def test_what_is_around_a_turned_set() -> None:
     np.testing.assert_allclose(found.scene["camera"]["position"], turn @ ([1.5, -2.4, 1.1] - place))
     np.testing.assert_allclose(found.scene["camera"]["target"], turn @ ([0.1, 0.2, 0.1] - place))
     np.testing.assert_allclose(found.scene["camera"]["up"], turn @ [0.1, 0.2, 1])
-    level = found.scene["objects"]["plane 1"]
-    np.testing.assert_allclose(level["position"], turn @ ([0, 0, -1] - place))
-    np.testing.assert_allclose(level["normal"], turn @ [0, 0, 1], atol=1e-12)
+    disc = load_scene(found.scene).objects["plane 1"]
+    assert isinstance(disc, CylinderObject)
+    for point in np.random.default_rng(2).uniform(-60, 60, (300, 2)):
+        within = np.linalg.norm(point - [1.5, -2.4]) < np.sqrt(50**2 - 2.1**2)
+        assert [disc.holds(tuple(turn @ ([*point, -1 + up] - place))) for up in (-1e-4, 1e-4)] == [
+            within,
+            False,
+        ]
     (shines,) = (light for light in found.scene["lights"] if light.get("type") == "point")
     np.testing.assert_allclose(shines["position"], turn @ ([3, 0.5, 1] - place))
     box = load_scene(found.scene).objects["box 1"]

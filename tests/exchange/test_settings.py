@@ -138,3 +138,9 @@ def test_a_scene_may_speak_of_the_program_in_its_first_line(tmp_path: Path) -> N
     assert kind_of(scene) is None
     scene.write_text("# Mandelbulber settings file\n# version 2.20\n", encoding="utf-8")
     assert kind_of(scene) == "settings"
+
+
+def test_one_number_is_that_of_all_three() -> None:
+    main = parse_settings(settings("fractal_constant_factor 1.5;\njulia_c 1 2;"), "x.fract").main
+    assert main.vector("fractal_constant_factor", (1, 1, 1)) == (1.5, 1.5, 1.5)
+    assert main.vector("julia_c") == (1, 2, 0)

@@ -75,6 +75,26 @@ def test_what_is_inside(keys: str, holds: Callable[[Places], Any]) -> None:
     assert inside_solid(scene, POINTS.tolist()) == holds(POINTS).tolist()
 
 
+@pytest.mark.parametrize(
+    ("more", "kind"),
+    [
+        ("view_distance_max 9;", "cylinder"),
+        ("view_distance_max 0.5;", "plane"),
+        ("view_distance_max 9;\nlimits_enabled true;", "plane"),
+        ("view_distance_max 9;\nprimitive_plane_1_rotation 180 0 0;", "plane"),
+    ],
+)
+def test_a_plane_ends_where_rays_do_that_meet_it_from_above(more: str, kind: str) -> None:
+    keys = solid("plane", position="0 0 -0.4")
+    level = import_text(settings(f"{CAMERA}\n{SPONGE}\n{keys}\n{more}"), "x.fract").scene["objects"][
+        "plane 1"
+    ]
+    assert level["type"] == kind
+    if kind == "cylinder":
+        assert level["radius"] == pytest.approx(np.sqrt(9**2 - 2.5**2))
+        np.testing.assert_allclose(level["position"], [1.5, -4.4, -0.4 - level["height"] / 2])
+
+
 def test_where_it_stands_and_what_it_is_made_of() -> None:
     keys = solid("box", size="1 2 3", position="1 2 3", rotation="20 -35 50", repeat="4 0 0", material_id="2")
     found = import_text(settings(f"{CAMERA}\n{SPONGE}\n{keys}\nmat2_surface_color ffff 0 0;"), "x.fract")
