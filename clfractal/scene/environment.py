@@ -86,7 +86,7 @@ def read_map(environment: Environment, folder: Path) -> EnvironmentMap:
         return EnvironmentMap(upright(found.pixels, environment))
 
 
-@lru_cache(maxsize=2)
+@lru_cache(maxsize=1)  # they may be large
 def _read(path: Path, stretch: bool, changed: int, size: int) -> Floats:
     from clfractal.files.environment_map import read_environment
 

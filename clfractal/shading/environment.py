@@ -67,7 +67,7 @@ def pack_environment(pixels: Floats, sun: Sun | None = None) -> PackedEnvironmen
     """Puts tables, pixels and the sun's numbers into one buffer.
 
     Args:
-        pixels: shape (height, width, 3), linear Rec. 709, finite and not negative; width at least height.
+        pixels: shape (height, width, 3), linear Rec. 709, finite and not negative.
         sun: the disc before them.
     """
     height, width, _ = pixels.shape

@@ -11,12 +11,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 from PIL import Image
 
+from clfractal.cli.proposals import Moved
 from clfractal.exchange import program_folder
 from clfractal.exchange.mandelbulber import Imported, import_settings, import_text
 from clfractal.exchange.parameters import rotation
 from clfractal.exchange.surroundings import picture_named
 from clfractal.files.map_directions import in_picture
 from clfractal.scene.load import load_scene
+from clfractal.viewer.named import carried, data_files
 from tests.exchange.files import settings
 from tests.exchange.pictures import install, picture
 from tests.shell import InProcess
@@ -215,3 +217,18 @@ class TestShell:
             2,
             "environment.file: is a picture of Mandelbulber 2, which is not installed: 'mandelbulber:sea.png'",
         )
+
+    def test_pictures_of_the_program_stay_where_they_are(self, clf: InProcess) -> None:
+        text = settings(f"{TEXTURED}\nfile_background $SHARED_DIR/textures/sea.png;")
+        Path("y.fract").write_text(text, encoding="utf-8")
+        Path("away").mkdir()
+        assert clf("import", "y.fract", "-o", "away/y.yaml").status == 0
+        scene = load_scene("away/y.yaml")
+        assert scene.environment is not None
+        assert scene.environment.file == "mandelbulber:sea.png"
+        assert [path.name for path in Path("away").iterdir()] == ["y.yaml"]
+        # Variations and the window write it elsewhere.
+        here = Moved(Path("away/y.yaml"), scene, Path(), "variations").plain(scene)
+        assert here["environment"]["file"] == "mandelbulber:sea.png"
+        along = carried(None, Path("away"), data_files(scene), Path("away"), Path("z.yaml"))
+        assert (along.names, along.copies) == ({"mandelbulber:sea.png": "mandelbulber:sea.png"}, {})

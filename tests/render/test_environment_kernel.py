@@ -41,6 +41,13 @@ def spots(height: int = 16) -> npt.NDArray[np.float32]:
     return pixels
 
 
+# Of pictures that were no maps: square, higher than wide, wider, and with more rows than tables have.
+STRETCHED = tuple(
+    np.random.default_rng(7).random((*size, 3)).astype(np.float32) ** 6
+    for size in ((20, 20), (31, 7), (5, 40), (600, 30))
+)
+
+
 def random_directions(count: int, seed: int) -> Floats:
     """Uniform on the sphere, with the poles, the seam, the axes and their neighbourhood among them."""
     found = np.random.default_rng(seed).normal(size=(count, 3))
@@ -90,7 +97,9 @@ def test_no_direction_reads_past_the_map(directions: list[list[float]]) -> None:
     np.testing.assert_allclose(found.density, 1 / (4 * np.pi), rtol=1e-5)
 
 
-@pytest.mark.parametrize("pixels", [a_map(), spots(), a_map(1), a_map(5), np.ones((8, 16, 3), np.float32)])
+@pytest.mark.parametrize(
+    "pixels", [a_map(), spots(), a_map(1), a_map(5), np.ones((8, 16, 3), np.float32), *STRETCHED]
+)
 def test_the_density_is_one_over_the_sphere(pixels: npt.NDArray[np.float32]) -> None:
     """By midpoints of parts of cells, which are exact for steps."""
     packed = pack_environment(pixels)
@@ -144,7 +153,7 @@ def test_a_sample_knows_its_density(precision: Precision, lanes: int) -> None:
     assert (again.density == found.sample_density).mean() > 0.999
 
 
-@pytest.mark.parametrize("pixels", [spots(), a_map(), spots(700)], ids=["spots", "random", "reduced"])
+@pytest.mark.parametrize("pixels", [spots(), a_map(), spots(700), *STRETCHED])
 def test_where_light_is_there_is_density(pixels: npt.NDArray[np.float32]) -> None:
     """Else its weight would be infinite; and no weight is much above the whole light."""
     packed = pack_environment(pixels)
