@@ -119,7 +119,7 @@ class EndsWriter(ABC):
         """The same where a scene shows a place of the formula's space: orbits begin as a table says."""
         over_reals = number_type == "real"
         state = "state" if over_reals else "dual_state"
-        lines = [f"const placed at = placed_at(point, {self._table()}, k);"]
+        lines = ["const placed at = placed_at(point, placed_table(k), k);"]
         for i, axis in enumerate("xyz"):
             near = self.constants.text((0, "center", i))
             coordinate = f"{near} + at.moved.{axis}"
@@ -142,11 +142,13 @@ class EndsWriter(ABC):
     def start_growth(self) -> str:
         """The scalar derivative where an orbit begins."""
         head = "INLINE real start_growth(vec point, __constant const scalar *k) {"
-        lines = [f"const placed at = placed_at(point, {self._table()}, k);"]
+        lines = ["const placed at = placed_at(point, placed_table(k), k);"]
         return function_text(head, lines, "return placed_growth(&at, k);")
 
-    def _table(self) -> str:
-        return f"(int)k[{self.constants.slot((0, 'place', 0))}]"
+    def placed_table(self) -> str:
+        """Where among the constants the table of begun orbits stands."""
+        at = f"(int)k[{self.constants.slot((0, 'place', 0))}]"
+        return function_text("INLINE int placed_table(__constant const scalar *k) {", [], f"return {at};")
 
     def _fourth(self, number_type: NumberType) -> list[str]:
         """The fourth coordinate of a point in space, as the first link has it."""

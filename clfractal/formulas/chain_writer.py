@@ -42,7 +42,8 @@ class ChainWriter(EndsWriter):
 
     def write(self) -> tuple[str, Facts, Constants]:
         """The text, what kernels know of it, and the places of what the host passes."""
-        parts = [self._has_usual_values(), *self._of_type("real"), *self._of_type("dual")]
+        parts = [self.placed_table()] if self.placed else []
+        parts += [self._has_usual_values(), *self._of_type("real"), *self._of_type("dual")]
         parts += filter(None, [self.carried_number()])
         if self.has_derivative:
             parts += (self._apply_derivative(index, usual=usual) for index, usual in self.ways)

@@ -8,9 +8,11 @@ Superfractalthing Maths, 2013. Here it is the formula's own tree that is differe
 bound below.)
 
 |p| alone decides where a point's orbit begins, in steps of 4: a table has for each the count, and there Z, J, and the
-scalar derivative. The bound: B_k being the second derivatives, what is left out is B_k p p / 2. It moves the point
-itself by |J_k^+ B_k| |p|^2 / 2, which is to be at most `STRAIGHT` of |p|; and |J_k p| is to be at most that, too. At
-conditions, folds and poles the map goes another way: no orbit begins behind one that lies nearer than 2 |p|.
+scalar derivative. The bound: B_k being the second derivatives, what is left out is B_k p p / 2. It is to be at most
+`STRAIGHT` of what |p| moves z at most, the largest singular value of J_k; and |J_k p| is to be at most that, too. (Many
+maps hardly stretch space in one direction, so their sets are as if drawn along it: what is off by as little there is
+beyond the picture.) At conditions, folds and poles the map goes another way: no orbit begins behind one that lies
+nearer than 2 |p|.
 """
 
 from __future__ import annotations
@@ -39,12 +41,12 @@ STEP = 2
 """How many of these exponents share an entry of the table (`PLACE_STEP` in `kernels/formulas/place.h`)."""
 FARTHEST = 8
 """How much farther than the set itself the farthest are, as an exponent."""
+HEAD = 6
+"""Numbers before the entries."""
 # Orbits of one place are found anew where it is magnified by so many more bits: films share them in between.
 _SHARED_BITS = 64
 # Digits that values have beyond those of the nearest points.
 _BITS_BESIDE = 80
-# A map that flattens space more than this has no slope in a direction: what happens there, higher derivatives decide.
-_FLAT = 1e-12
 # No orbit begins where it ends.
 _WITHIN = 0.999
 
@@ -76,7 +78,7 @@ class Begun:
 
 
 def table_of(chain: Chain) -> tuple[float, ...]:
-    """The table of a placed chain as kernels read it: a head of four numbers, then its entries.
+    """The table of a placed chain as kernels read it: a head of six numbers, its entries, and z of the place's own orbit.
 
     Raises:
         FormulaError: mpmath is not there; the path says where.
@@ -93,50 +95,83 @@ def table_of(chain: Chain) -> tuple[float, ...]:
         most = place.scale * 2.0 ** (exponent + STEP)
         numbers += (next((each for each in reversed(begun) if each.reach >= most), begun[0])).numbers()
     width = len(numbers) // len(exponents)
-    return (2.0 * NEAREST, float(len(exponents)), float(width), place.scale, *numbers)
+    head = (2 * NEAREST, len(exponents), width, place.scale, HEAD + len(numbers), begun[0].count)
+    own = (value for each in begun for value in each.state[: chain.size])
+    return (*map(float, head), *numbers, *own)
 
 
 def begun_orbits(chain: Chain) -> tuple[Begun, ...]:
     """Where orbits around a chain's place may begin, from the first to the last; each is as exact as those before it."""
+    return _orbit(chain).begun
+
+
+def steps_per_pixel(chain: Chain) -> float:
+    """How many steps of float64 wide a pixel around a chain's place is in z, at the least.
+
+    Pixels are thousandths of a scene unit. Where orbits begin too soon, at a fold through the place, or pass near a
+    critical point later on, what is seen in the picture is lost.
+    """
+    place, orbit = chain.place, _orbit(chain)
+    assert place is not None
+    begun = next((each for each in reversed(orbit.begun) if each.reach >= place.scale), orbit.begun[0])
+    spread = min(orbit.spread[begun.count :], default=math.inf)
+    return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, slots=True)
+class _Orbit:
+    """What is known of a place's own orbit.
+
+    Attributes:
+        spread: after 0, 1, ... applications, how much these stretch space, over |z|; an infinity before orbits begin.
+    """
+
+    begun: tuple[Begun, ...]
+    spread: tuple[float, ...]
+
+
+def _orbit(chain: Chain) -> _Orbit:
     place = chain.place
     assert place is not None
     depth = math.ceil(math.log2(place.magnification)) - NEAREST
     depth += -depth % _SHARED_BITS
-    return _begun_orbits(replace(chain, place=None), place.exact, depth, place.applications)
+    return _orbit_of(replace(chain, place=None), place.exact, depth, place.applications)
 
 
 @lru_cache(maxsize=16)
-def _begun_orbits(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -> tuple[Begun, ...]:
+def _orbit_of(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -> _Orbit:
     try:
         import mpmath
     except ImportError:
         raise FormulaError("needs mpmath: pip install 'clfractal[deep]'", Where(path="deep")) from None
     with mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
         point = [mpmath.mpf(part.numerator) / part.denominator for part in center]
-        return tuple(_begun(chain, point, 2.0**-depth, most))
+        return _follow(chain, point, 2.0**-depth, most)
 
 
-def _begun(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> Iterator[Begun]:
+def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _Orbit:
     backend = JetBackend()
     c = [_jet(each) for each in space_to_state(chain, list(map(coordinate_jet, center, range(3))), backend)]
     beside = [_jet(each) for each in carried_at_start(chain, c, backend)]
     state = [_jet(0.0)] * chain.size if chain.add == "point" else list(c)
     state += beside
-    growth, least = 1.0, math.inf
+    growth, reach = 1.0, math.inf
     first = int(chain.starts_counted)
+    begun: list[Begun] = []
+    spread: list[float] = []
     for count in range(most + 1):
+        values = tuple(float(each.value) for each in state)
+        slopes = np.array([each.slope for each in state])
+        away = math.hypot(*values[: chain.size])
         if count > first:
-            least = min(least, _straight(state, chain.size), backend.reach)
-            within = math.hypot(*(float(each.value) for each in state[: chain.size]))
-            if not (least >= nearest and within <= _WITHIN * chain.bailout):
-                return
-        if count >= first:
-            # (All orbits may begin at the first.)
-            values, slopes = (
-                tuple(float(each.value) for each in state),
-                np.array([each.slope for each in state]),
-            )
-            yield Begun(count, values, slopes, growth, math.inf if count == first else least)
+            # (At the first one all may begin.)
+            if not away <= _WITHIN * chain.bailout:
+                break
+            reach = min(reach, _straight(state, chain.size), backend.reach)
+        if count >= first and reach >= nearest:
+            begun.append(Begun(count, values, slopes, growth, reach))
+        stretched = float(np.linalg.norm(slopes[: chain.size], 2)) if np.isfinite(slopes).all() else 0.0
+        spread.append(stretched / max(away, 1.0) if count >= first and stretched > 0 else math.inf)
         bound = chain.link_at(count).bound
         constant = [_jet(each) for each in constant_of(bound, c)]
         new, names = applied(bound, state, constant, backend, number=count, carried=chain.carried)
@@ -144,6 +179,7 @@ def _begun(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> It
             found = evaluate(bound.derivative, {**names, "dr": _jet(growth)}, backend)
             growth = float(found.value if isinstance(found, Jet) else found)
         state = [_jet(each) for each in new]
+    return _Orbit(tuple(begun), tuple(spread))
 
 
 def _straight(state: Sequence[Jet], size: int) -> float:
@@ -152,14 +188,13 @@ def _straight(state: Sequence[Jet], size: int) -> float:
     bends = np.array([full_bend(each.bend) for each in state[:size]])
     if not (np.isfinite(slopes).all() and np.isfinite(bends).all()):
         return 0.0
-    spread = np.linalg.svd(slopes, compute_uv=False)
-    if not spread[-1] > _FLAT * spread[0]:
+    most = float(np.linalg.norm(slopes, 2))
+    if most == 0:
         return 0.0
     # (Where second derivatives vanish by chance, those behind them are small over a small part of z.)
-    found = STRAIGHT / float(spread[0])
-    if bends.any():
-        off = float(np.linalg.norm(np.tensordot(np.linalg.pinv(slopes), bends, 1))) / 2
-        found = min(found, STRAIGHT / off) if off > 0 else found
+    found = STRAIGHT / most
+    off = float(np.linalg.norm(bends)) / (2 * most)
+    found = min(found, STRAIGHT / off) if off > 0 else found
     for each in state[size:]:
         bend, slope = float(np.linalg.norm(full_bend(each.bend))), float(np.linalg.norm(each.slope))
         if bend > 0:

@@ -26,6 +26,8 @@ PrecisionChoice = Literal["auto", "float32", "float64"]
 # float32 is given up where a pixel is less than this many of its steps wide: distances are differences of coordinates,
 # and hits, normals and shadow starts work at fractions of a pixel.
 FLOAT32_STEPS_PER_PIXEL = 64.0
+# Orbits of a place shown magnified: below this, what is seen is made of rounding.
+DEEP_STEPS_PER_PIXEL = 16.0
 # Normals that are made from the places of a pixel's points want these this much finer: a place that is off by a 512th of
 # the way to the next turns the normal by a tenth of a degree.
 PLACES_PER_POINT = 8.0
@@ -205,7 +207,7 @@ def choose_precision(
         if wanted == "float32" or not has_float64:
             cause = "the device has none" if wanted != "float32" else "got float32"
             raise SceneError(f"deep needs float64, and {cause}", Where(path="precision"))
-        return "float64", ""
+        return "float64", _of_deep(scene)
     if wanted != "auto":
         return wanted, ""
     view = scene_view(scene, eye)
@@ -214,6 +216,18 @@ def choose_precision(
     if has_float64:
         return "float64", ""
     return "float32", "pixels are finer than float32 resolves here, and the device has no float64"
+
+
+def _of_deep(scene: Scene) -> str:
+    """The remark on a place at which orbits are not told apart."""
+    from clfractal.formulas.deep import steps_per_pixel  # which asks for many digits
+
+    if steps_per_pixel(scene.chain) >= DEEP_STEPS_PER_PIXEL:
+        return ""
+    return (
+        "deep.center lies on a fold of the formula, or its orbit near a critical point: float64 does not tell orbits around"
+        " it apart at this magnification; another centre nearby may do"
+    )
 
 
 def make_region(size: tuple[int, int], region: tuple[int, int, int, int] | None) -> Region:

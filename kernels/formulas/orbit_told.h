@@ -16,6 +16,29 @@ INLINE real trap_distance(trap near, state z) {
     switch (near.shape) { TRAPS(AWAY) default: return (real)(REAL_LARGEST); }
 }
 
+// How near z comes to the trap before an orbit begins: all are where the place's own is. Where it begins counts, too, unless that is at its
+// point, before any application.
+#ifdef PLACED
+INLINE real told_before(trap near, state z, orbit_record orbit, constants k) {
+    const int table = placed_table(k), own = table + (int)k[table + 4], first = (int)k[table + 5];
+    const real none = (real)(REAL_LARGEST);
+    real nearest = pick(less(R(0.0), z.begun), trap_distance(near, z), none);
+    state past = z;
+    for (int n = max(first, 1); any_lane(less((real)((scalar)n), z.begun)); ++n) {
+        __constant const scalar *at = k + own + (n - first) * STATE_SIZE;
+        past.s0 = at[0];
+        past.s1 = at[1];
+        past.s2 = at[2];
+        nearest = pick(less((real)((scalar)n), z.begun), fmin(nearest, trap_distance(near, past)), nearest);
+    }
+    return nearest;
+}
+#else
+INLINE real told_before(trap near, state z, orbit_record orbit, constants k) {
+    return FIRST_COUNT > 0 ? trap_distance(near, z) : (real)(REAL_LARGEST);
+}
+#endif
+
 // The smallest distance of z from the trap after one application or more, the one that leaves the bailout included; or, where `carried`
 // is the number of a name, the number beside z of that name after the last of them. An orbit that is outside from the start has only its
 // start.
@@ -24,7 +47,7 @@ INLINE real formula_told(trap near, int carried, vec point, mask active, orbit_r
     start(point, k, &c, &z);
     const real at_start = trap_distance(near, z);
     const int first = ORBIT_FIRST(z, active);
-    real nearest = first > 0 ? at_start : (real)(REAL_LARGEST);
+    real nearest = told_before(near, z, orbit, k);
     mask alive = active & less_equal(state_square(z), (real)(orbit->bailout_square));
     for (int n = first; n < orbit->iterations; ++n) {
         if (!any_lane(alive)) break;

@@ -2,10 +2,12 @@
 // many applications on, where a table says so.
 //
 // The table stands among the constants: the lowest binary exponent of |p|^2 that is told apart, the number of entries, how wide these are,
-// and one unit of the scene in the formula's space; then the entries. Each has the count, the scalar derivative, and of each number of the
-// state its value at the place and how it changes with the point. Which one is a point's, |p| alone decides.
+// one unit of the scene in the formula's space, where z of the place's own orbit stands, and the count of the first one; then the entries.
+// Each has the count, the scalar derivative, and of each number of the state its value at the place and how it changes with the point.
+// Which one is a point's, |p| alone decides.
 #include "device/gather.h"
 
+#define PLACE_HEAD 6
 #define PLACE_STEP 2  // binary logarithm of how many exponents share an entry
 #if REAL_IS_DOUBLE
 #define PLACE_EXPONENT(square) ((mask)(as_whole(square) >> 52) - 1023)
@@ -24,7 +26,7 @@ INLINE placed placed_at(vec point, int table, __constant const scalar *k) {
     mask index = (PLACE_EXPONENT(vec_dot(point, point)) - lowest) >> PLACE_STEP;
     index = min(max(index, (mask)(0)), last);
     placed at;
-    at.entry = index * (mask)((int)k[table + 2]) + (mask)(table + 4);
+    at.entry = index * (mask)((int)k[table + 2]) + (mask)(table + PLACE_HEAD);
     at.apart = LANES > 1 && any_lane(index != (mask)((INTEGER)lanes_most(index)));
     at.moved = vec_scale(point, (real)(k[table + 3]));
     return at;
