@@ -28,10 +28,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from clfractal.errors import FormulaError, Where
+from clfractal.formulas.application import applied, carried_at_start, constant_of, space_to_state
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.evaluate import evaluate
 from clfractal.formulas.jets import Jet, JetBackend, constant_jet, coordinate_jet, full_bend
-from clfractal.formulas.reference import applied, carried_at_start, constant_of, space_to_state
 
 STRAIGHT = 2.0**-20
 """What linear orbits may be off, as a part of the distance from the place."""
@@ -105,6 +105,24 @@ def begun_orbits(chain: Chain) -> tuple[Begun, ...]:
     return _orbit(chain).begun
 
 
+def begun_at(chain: Chain, points: NDArray[np.float64]) -> BegunAt:
+    """Where the orbits of points begin, shape (n, 3), scene units: as kernels read the table."""
+    table = np.array(table_of(chain))
+    lowest, count, width, scale = table[:4]
+    square = np.einsum("ij,ij->i", points, points)
+    exponents = np.where(square > 0, np.frexp(square)[1] - 1, lowest)
+    index = np.clip((exponents - lowest) // (2 * STEP), 0, count - 1).astype(int)
+    entries = table[HEAD : HEAD + int(count * width)].reshape(int(count), -1)[index]
+    numbers = entries[:, 2:].reshape(len(points), -1, 4).transpose(1, 2, 0)
+    moved = points.T * scale
+    values = [
+        own + slopes[0] * moved[0] + slopes[1] * moved[1] + slopes[2] * moved[2] for own, *slopes in numbers
+    ]
+    return BegunAt(
+        entries[:, 0].astype(np.int64), values, [[s * scale for s in slopes] for _, *slopes in numbers]
+    )
+
+
 def steps_per_pixel(chain: Chain) -> float:
     """How many steps of float64 wide a pixel around a chain's place is in z, at the least.
 
@@ -116,6 +134,21 @@ def steps_per_pixel(chain: Chain) -> float:
     begun = next((each for each in reversed(orbit.begun) if each.reach >= place.scale), orbit.begun[0])
     spread = min(orbit.spread[begun.count :], default=math.inf)
     return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
+
+
+@dataclass(frozen=True, slots=True)
+class BegunAt:
+    """Where orbits of some points begin.
+
+    Attributes:
+        counts: applications behind them, shape (n,).
+        values: the numbers of the state, each of shape (n,).
+        slopes: of each its three derivatives by the scene's coordinates, each of shape (n,).
+    """
+
+    counts: NDArray[np.int64]
+    values: list[NDArray[np.float64]]
+    slopes: list[list[NDArray[np.float64]]]
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,12 +8,19 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from fractions import Fraction
 from itertools import count, islice
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from clfractal.formulas.application import (
+    apply,
+    carried_at_start,
+    constant_of,
+    space_to_state,
+)
 from clfractal.formulas.backends import (
     Dual,
     DualBackend,
@@ -22,18 +29,18 @@ from clfractal.formulas.backends import (
     constant_dual,
     seeded,
 )
-from clfractal.formulas.blocks import run
 from clfractal.formulas.carried import names_at_end
 from clfractal.formulas.chain import Chain
-from clfractal.formulas.definition import BoundFormula, point_name
+from clfractal.formulas.deep import begun_at
 from clfractal.formulas.evaluate import Backend, evaluate, evaluate_constant
-from clfractal.formulas.names import APPLICATION
 
 __all__ = [
     "DualBackend",
     "MpmathBackend",
     "NumpyBackend",
     "apply",
+    "carried_at_start",
+    "constant_of",
     "distance",
     "escape",
     "evaluate",
@@ -41,120 +48,13 @@ __all__ = [
     "mp_escape",
     "mp_jacobian",
     "mp_orbit",
+    "space_to_state",
 ]
 
 Float = NDArray[np.float64]
 
 # Applications beyond the limit, for points outside that have not reached the distance bailout at the limit.
 EXTRA_APPLICATIONS = 64
-
-
-def apply(
-    bound: BoundFormula,
-    state: Sequence[Any],
-    constant: Sequence[Any],
-    backend: Backend,
-    *,
-    number: int = 0,
-    carried: Sequence[str] | None = None,
-) -> list[Any]:
-    """One application: the map with its repeats, then C (`constant`) added unless nothing is to be.
-
-    Args:
-        state: the numbers of z, and behind them those that are carried.
-        number: the application's, from 0.
-        carried: the names of the latter; None: those of the formula.
-    """
-    return applied(bound, state, constant, backend, number=number, carried=carried)[0]
-
-
-def applied(
-    bound: BoundFormula,
-    state: Sequence[Any],
-    constant: Sequence[Any],
-    backend: Backend,
-    *,
-    number: int = 0,
-    carried: Sequence[str] | None = None,
-) -> tuple[list[Any], dict[str, Any]]:
-    """The same, and the values of all names that a scalar rule for the derivative may use."""
-    formula = bound.formula
-    size = len(formula.variables)
-    if carried is None:
-        carried = [each.name for each in formula.state]
-    if formula.steps:
-        return _apply_steps(bound, state, constant, backend, number, carried)
-    fixed = {name: float(value) for name, value in bound.values.items()}
-    names: dict[str, Any] = {
-        APPLICATION: float(number),
-        **fixed,
-        **{point_name(v): c for v, c in zip(formula.variables, constant, strict=True)},
-    }
-    state, beside = list(state[:size]), list(state[size:])
-    for _ in range(bound.repeat):
-        names.update(zip(formula.variables, state, strict=True))
-        for name, node in formula.let:
-            names[name] = evaluate(node, names, backend)
-        state = [evaluate(node, names, backend) for node in formula.map]
-    return [*_added(bound, state, constant, backend), *beside], names
-
-
-def _added(bound: BoundFormula, state: Sequence[Any], constant: Sequence[Any], backend: Backend) -> list[Any]:
-    if bound.add == "none":
-        return list(state)
-    return [backend.call("add", [z, c]) for z, c in zip(state, constant, strict=True)]
-
-
-def _apply_steps(
-    bound: BoundFormula,
-    state: Sequence[Any],
-    constant: Sequence[Any],
-    backend: Backend,
-    number: int,
-    carried: Sequence[str],
-) -> tuple[list[Any], dict[str, Any]]:
-    """An application of a formula that is told in statements."""
-    formula = bound.formula
-    own = {each.name for each in formula.state}
-    names: dict[str, Any] = {
-        APPLICATION: float(number),
-        **{name: float(value) for name, value in bound.values.items()},
-        **{point_name(v): c for v, c in zip(formula.variables, constant, strict=True)},
-        **dict(zip(formula.variables, state, strict=False)),
-    }
-    beside = dict(zip(carried, state[len(formula.variables) :], strict=True))
-    names.update({name: value for name, value in beside.items() if name in own})
-    run(formula.steps, names, backend)
-    z = _added(bound, [names[name] for name in formula.variables], constant, backend)
-    return [*z, *(names[name] if name in own else value for name, value in beside.items())], names
-
-
-def carried_at_start(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:
-    """The numbers that go on beside z, before the first application."""
-    found = []
-    for name in chain.carried:
-        index, node = chain.begins(name)
-        bound = chain.links[index].bound
-        values = {name: float(value) for name, value in bound.values.items()}
-        values.update(zip(bound.formula.variables[:3], point, strict=False))
-        found.append(evaluate(node, values, backend))
-    return found
-
-
-def space_to_state(chain: Chain, point: Sequence[Any], backend: Backend) -> list[Any]:
-    """A point in space as a state: with the slice's fourth coordinate for four variables."""
-    if chain.size == 3:
-        return list(point)
-    formula = chain.first.formula
-    if formula.slice is None:
-        return [*point, 0.0]
-    names = {**chain.first.values, **dict(zip(formula.variables, point, strict=False))}
-    return [*point, evaluate(formula.slice, names, backend)]
-
-
-def constant_of(bound: BoundFormula, point: Sequence[Any]) -> Sequence[Any]:
-    """C: the Julia constant, or the point in space as a state."""
-    return list(bound.julia) if bound.julia is not None else point
 
 
 def escape(
@@ -171,11 +71,13 @@ def escape(
     with np.errstate(all="ignore"):
         state, point = start(chain, points, backend)
         count = np.zeros(len(points), dtype=np.int64)
+        begun = _begun(chain, points)
         alive = _norm(state[:size]) <= radius
         for application in range(iterations):
-            index = np.flatnonzero(alive)
-            if not len(index):
+            if not alive.any():
                 break
+            index = np.flatnonzero(alive & (begun <= application))
+            count += alive & (begun > application)
             bound = chain.link_at(application).bound
             here = [p[index] for p in point]
             before = [z[index] for z in state]
@@ -263,12 +165,33 @@ def _solid(chain: Chain, index: int, last: Sequence[Any], backend: Backend) -> A
 def start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], list[Float]]:
     """The state before the first application and the point as a state."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
-    raw = space_to_state(chain, list(columns), backend)
+    raw = space_to_state(chain, _in_formula(chain, list(columns), backend, float), backend)
     point = [np.array(np.broadcast_to(p, columns[0].shape), dtype=float) for p in raw]
+    if chain.place is not None:
+        return begun_at(chain, points).values, point
     state = [np.zeros_like(p) if chain.add == "point" else p.copy() for p in point]
     beside = carried_at_start(chain, point, backend)
     state += [np.array(np.broadcast_to(each, columns[0].shape), dtype=float) for each in beside]
     return state, point
+
+
+def _in_formula(
+    chain: Chain, point: Sequence[Any], backend: Backend, number: Callable[[Any], Any]
+) -> list[Any]:
+    """A point of the scene in the formula's space; `number` makes a constant of a fraction."""
+    place = chain.place
+    if place is None:
+        return list(point)
+    scale = number(1 / Fraction(place.magnification))
+    return [
+        backend.call("add", [number(center), backend.call("mul", [each, scale])])
+        for center, each in zip(place.exact, point, strict=True)
+    ]
+
+
+def _begun(chain: Chain, points: Float) -> NDArray[np.int64]:
+    """The applications at which orbits begin; those of a place shown magnified together with all that is around it."""
+    return np.zeros(len(points), np.int64) if chain.place is None else begun_at(chain, points).counts
 
 
 def _norm(state: Sequence[Float]) -> Float:
@@ -286,10 +209,15 @@ def _dual_orbit(
     """Orbits over duals until |z| > distance bailout: last states, those at the limit, counts, and which are inside."""
     columns = np.array(points, dtype=float).reshape(-1, 3).T
     shape = columns[0].shape
-    point = [_full(p, shape) for p in space_to_state(chain, seeded(list(columns)), backend)]
+    own = _in_formula(chain, seeded(list(columns)), backend, float)
+    point = [_full(p, shape) for p in space_to_state(chain, own, backend)]
     zero = _full(0.0, shape)
     state = [zero] * chain.size if chain.add == "point" else list(point)
     state += [_full(each, shape) for each in carried_at_start(chain, point, backend)]
+    begun = _begun(chain, columns.T)
+    if chain.place is not None:
+        found = begun_at(chain, columns.T)
+        state = [Dual(value, tuple(slopes)) for value, slopes in zip(found.values, found.slopes, strict=True)]
     size = chain.size
     count = np.zeros(shape, dtype=np.int64)
     inside = np.zeros(shape, dtype=bool)
@@ -311,7 +239,8 @@ def _dual_orbit(
         bound = chain.link_at(application).bound
         constant = constant_of(bound, point)
         new = apply(bound, state, constant, backend, number=application, carried=chain.carried)
-        state = [_select(alive, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
+        goes_on = alive & (begun <= application)
+        state = [_select(goes_on, _full(n, shape), z) for n, z in zip(new, state, strict=True)]
         count += alive
         alive = alive & (_norm([z.value for z in state[:size]]) <= chain.distance_bailout)
     return state, shown, count, inside
@@ -370,7 +299,10 @@ def _mp_states(
     chain: Chain, point: Iterable[Any], backend: Backend, number: Callable[[Any], Any]
 ) -> Iterator[list[Any]]:
     """The states after 0, 1, ... applications, without end; `number` makes a constant one of theirs."""
-    c = [number(p) for p in space_to_state(chain, list(point), backend)]
+    import mpmath
+
+    own = _in_formula(chain, list(point), backend, lambda part: mpmath.mpf(part.numerator) / part.denominator)
+    c = [number(p) for p in space_to_state(chain, own, backend)]
     state = [number(0.0)] * chain.size if chain.add == "point" else list(c)
     state += [number(each) for each in carried_at_start(chain, c, backend)]
     for application in count():
