@@ -12,14 +12,14 @@ from clfractal.exchange.colors import coloring_of
 from clfractal.exchange.hollows import take_their_distance
 from clfractal.exchange.installed import Installed, find_installed
 from clfractal.exchange.look import Look, look_of
-from clfractal.exchange.measure import are_inside, ball_of
+from clfractal.exchange.measure import are_inside, ball_of, distance_at
 from clfractal.exchange.mists import move_counts
 from clfractal.exchange.placing import Placing, matrix_of, mirror, place_around, placing_of
 from clfractal.exchange.sequence import formula_of, joined_of
 from clfractal.exchange.settings import Section, Settings, parse_settings, read_settings
 from clfractal.exchange.solids import solids_of
 from clfractal.exchange.translate import COLOR, carried_name
-from clfractal.exchange.view import is_mirrored, view_of
+from clfractal.exchange.view import NEAR, is_mirrored, view_of
 from clfractal.files.fragments import block_lines
 
 # What windows, films, files and other ways to look at a scene have, and what says how theirs are computed.
@@ -150,6 +150,8 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     scene: dict[str, Any] = {"version": 1}
     scene["formula"] = formula_of(settings, installed, remarks)
     scene |= view_of(settings, remarks)
+    placing = placing_of(settings)
+    _look_at_the_set(scene, placing, mirrored=is_mirrored(settings))
     scene |= look_of(settings, scene["camera"], look, remarks)
     joined = joined_of(settings, installed, remarks)
     solids, materials = solids_of(settings.main, len(joined), look == "ours", remarks)
@@ -158,7 +160,6 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     objects = {**joined, **solids, **limits}
     if objects:
         scene["objects"] = objects
-    placing = placing_of(settings)
     if placing is not None:
         place_around(scene, placing, (*solids, *limits))
     if materials:
@@ -176,6 +177,19 @@ def imported(settings: Settings, look: Look = "same", formulas: Path | None = No
     remarks += (f"line {line}: the film in [{name}] is not taken over" for name, line in settings.tables)
     remarks += _left(settings)
     return Imported(scene, tuple(remarks), tuple(settings.origins))
+
+
+def _look_at_the_set(scene: dict[str, Any], placing: Placing | None, *, mirrored: bool) -> None:
+    """Moves a target that was next to the eye as far away as the set is, by which occlusion and glow have their sizes."""
+    camera = scene["camera"]
+    eye, target = camera["position"], camera["target"]
+    away = math.dist(eye, target)
+    if scene["formula"] == "none" or away > 1.1 * NEAR * math.hypot(*eye):
+        return
+    place = eye if placing is None else placing.place(eye)
+    found = distance_at(scene["formula"], [*place[:2], -place[2]] if mirrored else place)
+    if away < found < math.inf:
+        camera["target"] = [a + found / away * (b - a) for a, b in zip(eye, target, strict=True)]
 
 
 def _without_unused(main: Section) -> None:

@@ -18,7 +18,7 @@ _LENS = 0.0015
 SENSOR = 0.024
 """Height of our sensor by default."""
 MOST_PIXELS = 65_536
-_NEAR = 1e-6
+NEAR = 1e-6
 """A target that is nearer than this part of the camera's distance from the origin is moved away, along the view: rays go
 through a plane there, whose places would be rounded to parts of pixels. Deep zooms have targets 1e-13 away."""
 
@@ -57,8 +57,8 @@ def _camera(main: Section, remarks: list[str]) -> dict[str, Any]:
     if away == 0:
         remarks.append("target: is where the camera is; the camera looks along y")
         target = (position[0], position[1] + 1, position[2])
-    elif away < _NEAR * math.hypot(*position):
-        farther = _NEAR * math.hypot(*position) / away
+    elif away < NEAR * math.hypot(*position):
+        farther = NEAR * math.hypot(*position) / away
         target = tuple(a + farther * (b - a) for a, b in zip(position, target, strict=True))
     if _parallel(up, [a - b for a, b in zip(target, position, strict=True)]):
         remarks.append("camera_top: is along the view; z is up")

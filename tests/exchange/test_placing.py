@@ -56,7 +56,10 @@ def test_a_target_close_to_the_camera(more: str) -> None:
         f"{key} {' '.join(str(Decimal(each.numerator) / each.denominator) for each in place)};\n"
         for key, place in (("camera", camera), ("target", target))
     )
-    found = import_text(settings(f"{keys}camera_top 0.1 0.2 1;\nfov 0.9;\n{more}{SPONGE}"), "x.fract")
+    found = import_text(
+        settings(f"{keys}camera_top 0.1 0.2 1;\nfov 0.9;\nambient_occlusion_enabled true;\n{more}{SPONGE}"),
+        "x.fract",
+    )
     view = scene_view(load_scene(found.scene))
     turn = turn_of((-35, 62, 110)) if more else np.eye(3)
     forward = turn @ (np.array([-3, 5, 2]) / np.sqrt(38))
@@ -66,6 +69,13 @@ def test_a_target_close_to_the_camera(more: str) -> None:
     across = places / (places @ forward)[:, None] - forward
     np.testing.assert_allclose(across @ forward, 0, atol=1e-8)
     np.testing.assert_allclose(across, np.linspace(0, 1.2, 100)[:, None] * view.side, atol=1e-8)
+    # Occlusion is sought as far as the picture is high at the set, not at the target: 0.3 of it.
+    place = np.subtract(found.scene["camera"]["position"], found.scene["camera"]["target"])
+    far = np.linalg.norm(np.maximum(np.abs(found.scene["camera"]["position"]) - 1, 0))
+    assert 0.2 * far < np.linalg.norm(place) < 1.01 * far
+    assert found.scene["renderer"]["ambient_occlusion"]["distance"] == pytest.approx(
+        0.27 * np.linalg.norm(place), rel=1e-3
+    )
 
 
 def test_what_is_around_a_turned_set() -> None:
