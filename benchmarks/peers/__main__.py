@@ -70,7 +70,7 @@ def _options(arguments: Sequence[str] | None) -> argparse.Namespace:
     )
     parser.add_argument("--jobs", type=int, default=1, metavar="N", help="files at a time")
     parser.add_argument(
-        "--seconds", type=float, default=120, metavar="S", help="what each program may take for a file"
+        "--seconds", type=float, default=240, metavar="S", help="what each program may take for a file"
     )
     parser.add_argument("--keep", type=Path, metavar="FOLDER", help="write depths there, NAME.npz")
     parser.add_argument("-o", "--output", type=Path, default=Path("build/peers.json"), metavar="FILE.json")
