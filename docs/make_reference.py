@@ -122,7 +122,7 @@ def _schema() -> dict[str, Any]:
 
 def _number(value: float) -> str:
     """As the pages write numbers: whole ones in full, in groups of three digits."""
-    return f"{value:,.0f}" if value == int(value) else f"{value:g}"
+    return f"{value:,.0f}" if value == int(value) and abs(value) < 1e16 else f"{value:g}"
 
 
 def _allowed(entry: dict[str, Any]) -> str:
@@ -143,7 +143,8 @@ def _allowed(entry: dict[str, Any]) -> str:
             kind = "positions" if component["minimum"] < 0 else f"colours, {_interval(component)}"
             return f"{len(entry['prefixItems'])} {kind}"
         if "prefixItems" in entry:
-            return f"{len(entry['prefixItems'])} numbers, {_interval(entry['prefixItems'][0])}"
+            component = entry["prefixItems"][0]  # (an exact number may be text, too)
+            return f"{len(entry['prefixItems'])} numbers, {_interval(component.get('anyOf', [component])[0])}"
         return f"a list of {entry.get('minItems', 0)} to {entry['maxItems']}"
     if kind in ("integer", "number"):
         return ("whole, " if kind == "integer" else "") + _interval(entry)

@@ -144,6 +144,8 @@ def check_suitable(scene: Scene) -> None:
     """Raises SceneError for a scene of which no views can be looked for."""
     if scene.layout is not None:
         raise SceneError("has views of its own; remove it to look for others", Where(path="layout"))
+    if scene.deep is not None:
+        raise SceneError("shows one place of the set; remove it to look for others", Where(path="deep"))
     if not isinstance(scene.renderer, SurfaceRenderer):
         word = "cut_plane" if isinstance(scene.renderer, CutPlaneRenderer) else "volume"
         raise SceneError(f"views are found of surfaces, got a {word}", Where(path="renderer.type"))

@@ -63,7 +63,7 @@ class Facts:
         if self.carried:
             values["STATE_CARRIED"] = self.carried
         if self.placed:
-            values["PLACED"] = 1
+            values["SHOWS_PLACE"] = 1
         return "".join(f"#define {name} {value}\n" for name, value in {**values, **read, **others}.items())
 
 

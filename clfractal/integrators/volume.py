@@ -27,6 +27,7 @@ from clfractal.scene.given import GivenGrid
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.model import Scene
 from clfractal.scene.sampled import Sampled
+from clfractal.scene.told_set import told_set
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.shading.environment import PackedEnvironment, packed_map
 from clfractal.shading.kind_numbers import kind_text
@@ -297,7 +298,7 @@ def grid_key(scene: Scene, plan: Plan) -> str:
             "anisotropy",
         },
     )
-    solid = scene.solid_mapping() if given is None else given.digest
+    solid = told_set(scene) if given is None else given.digest
     seen = shows_outside(settings) if given is None else least_visible(settings, given)
     return json.dumps([solid, shown, seen, plan.precision, plan.lanes])
 

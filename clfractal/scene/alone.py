@@ -40,7 +40,7 @@ def _asking(scene: Scene) -> Iterator[tuple[str, str, str]]:
         for key, each in maps_of(material):
             if each.kind is not None and each.kind.needs_set():
                 yield f"materials.{name}.{key}.by", f"{each.by} needs", "use another quantity, or a texture"
-    for key, given in (("glow", scene.glow), ("mist", scene.mist)):
+    for key, given in (("deep", scene.deep), ("glow", scene.glow), ("mist", scene.mist)):
         if given is not None:
             yield key, "needs", "remove it"
     for number, light in enumerate(scene.lights):

@@ -18,6 +18,7 @@ from clfractal.files.channels import (
 from clfractal.scene.alone import check_alone
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.deep_checks import check_deep
 from clfractal.scene.light_paths import PathLighting
 from clfractal.scene.lighting import MAX_ASKED
 from clfractal.scene.model import Scene
@@ -400,6 +401,7 @@ def _inside_formula(chain: "Chain", iterations: int, points: Sequence[Vector]) -
 # In this order: of several mistakes the first one is told.
 _PARTS = (
     check_alone,
+    check_deep,
     _check_steps,
     _check_carried,
     _check_volume,

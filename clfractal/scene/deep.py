@@ -1,4 +1,4 @@
-"""The scene's `deep`: a place of any depth that the scene shows, told exactly, and how much it is magnified."""
+"""The scene's `deep`: a place of any depth that it shows, told exactly, and how much it is magnified."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 from fractions import Fraction
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, Field
+from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from clfractal.formulas.place import Place
 from clfractal.schema.base import Section, problem
@@ -34,7 +34,8 @@ def _decimal(value: Any) -> str:
     return text
 
 
-Decimal = Annotated[str, BeforeValidator(_decimal)]
+_SCHEMA = {"anyOf": [{"type": "number", "minimum": -LARGEST, "maximum": LARGEST}, {"type": "string"}]}
+Decimal = Annotated[str, BeforeValidator(_decimal), WithJsonSchema(_SCHEMA, mode="validation")]
 """A number of any number of digits; in YAML in quotes, where it has more than 17."""
 ExactPosition = Annotated[tuple[Decimal, Decimal, Decimal], Field(strict=False)]
 
@@ -57,3 +58,18 @@ class Deep(Section):
     def place(self, applications: int) -> Place:
         """The place, as formulas know it; orbits have at most so many applications."""
         return Place(self.center, self.magnification, applications)
+
+
+def check_frames(scene: Any) -> None:
+    """Refuses cameras of a scene that look for what is seen: a magnified set has no end in the picture."""
+    if scene.deep is None:
+        return
+    views = scene.layout.views if scene.layout is not None else ()
+    cameras = [
+        ("camera", scene.camera),
+        *((f"layout.views.{number}.camera", view.camera) for number, view in enumerate(views)),
+        *((f"bookmarks.{name}", camera) for name, camera in scene.bookmarks.items()),
+    ]
+    for path, camera in cameras:
+        if camera is not None and camera.frame == "seen":
+            raise problem("seen cannot be combined with deep; use all", f"{path}.frame")

@@ -18,7 +18,7 @@ from clfractal.scene.animation import Animation
 from clfractal.scene.bookmarks import Bookmarks
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
-from clfractal.scene.deep import Deep
+from clfractal.scene.deep import Deep, check_frames
 from clfractal.scene.formula import Formula
 from clfractal.scene.glow import Glow
 from clfractal.scene.layout import Layout, Place
@@ -128,6 +128,7 @@ class Scene(Section):
         own = [view.camera for view in views if view.camera is not None]
         if all(camera.frame is None for camera in (self.camera, *own, *self.bookmarks.values())):
             return
+        check_frames(self)
         try:
             seen = [view for view, _ in self.views] if self.layout is not None else []
             self._settle(camera=self._framed(self.camera))
@@ -208,15 +209,6 @@ class Scene(Section):
             if isinstance(each, Joined)
             and (filled or each.join != "union" or isinstance(each, FormulaObject))
         }
-
-    def solid_mapping(self) -> dict[str, Any]:
-        """Plain data of all that makes up the set: the formula, and what is joined to it."""
-        joined = {}
-        for name, each in self.joined.items():
-            joined[name] = each.model_dump(mode="json", exclude={"material"})
-            if isinstance(each, FormulaObject):
-                joined[name]["formula"] = each.formula.mapping()
-        return {"formula": self.formula.mapping(), "joined": joined}
 
     @property
     def extent(self) -> Extent:
@@ -326,7 +318,7 @@ class Scene(Section):
         return self
 
     def take_tables(self, other: Self) -> None:
-        """Keeps the tables of another scene with the same tracks, so that their files need not be there."""
+        """Keeps the tables of another scene with the same tracks: their files need not be there."""
         self._read |= {name: found for name, found in other._read.items() if is_table(name)}
 
     @property
@@ -338,10 +330,8 @@ class Scene(Section):
         """
         from clfractal.formulas import catalog
 
-        chain = self.once(
-            "chain", lambda: catalog.resolve(self.formula.mapping(), None, Where(path="formula"))
-        )
-        deep = self.deep
+        where, deep = Where(path="formula"), self.deep
+        chain = self.once("chain", lambda: catalog.resolve(self.formula.mapping(), None, where))
         return chain if deep is None else chain.placed(deep.place(self.formula.iterations))
 
     @property

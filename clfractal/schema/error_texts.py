@@ -144,7 +144,7 @@ def _problem(details: ErrorDetails, root: Root) -> Problem | None:
 
 def _allowed(details: ErrorDetails) -> str:
     context = {
-        key: int(value) if isinstance(value, float) and value.is_integer() else value
+        key: int(value) if isinstance(value, float) and value.is_integer() and abs(value) < 1e16 else value
         for key, value in details.get("ctx", {}).items()
     }
     return _ALLOWED[details["type"]].format(**context)

@@ -5,7 +5,7 @@
 // Where a scene shows a place of a formula's space, magnified, orbits begin at counts of their own, and wait for them (place.h).
 // ORBIT_FIRST: the first application of those of some lanes. HAS_BEGUN: which of them wait no longer. START_GROWTH: the scalar derivative
 // where they begin. IN_SCENE: from a change in the formula's space to one in the scene's.
-#ifdef PLACED
+#ifdef SHOWS_PLACE
 #define ORBIT_FIRST(z, lanes) placed_first((z).begun, lanes)
 #define HAS_BEGUN(z) equal((z).begun, R(0.0))
 #define START_GROWTH(point) start_growth(point, k)

@@ -64,7 +64,7 @@ def of_others(count: int, precision: Precision) -> Iterator[Named]:
 
 
 # What none of the pictures has: fog around the set, exact normals of a grid, a grid along paths, clear glass, costly parts
-# of materials, light that water, balls and other shapes bend, and light that is sought.
+# of materials, light that water, balls and other shapes bend, light that is sought, and orbits that begin late.
 _MORE: dict[str, dict[str, Any]] = {
     "exact": {"renderer": {"type": "volume", "normals": "exact"}},
     "lit": {
@@ -95,6 +95,12 @@ _MORE: dict[str, dict[str, Any]] = {
         "objects": {"block": {"type": "box", "material": "glass"}},
     },
     "mist": {"mist": {"by": "iterations"}},
+    "deep": {"deep": {"magnification": 1e6}},
+    "deep volume": {"deep": {"magnification": 1e6}, "renderer": {"type": "volume", "normals": "exact"}},
+    "deep plane": {
+        "deep": {"magnification": 1e6},
+        "renderer": {"type": "cut_plane", "plane": {"corners": [[-1, -1, 0], [1, -1, 0], [-1, 1, 0]]}},
+    },
     "sought": {
         "lighting": {"mode": "path"},
         "materials": {"embers": {"emission": {"luminance": {"by": "iterations"}}}},

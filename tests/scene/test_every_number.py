@@ -40,6 +40,7 @@ lighting: {mode: path}
 PLANE = """\
 version: 1
 formula: {name: mandelbulb, iterations: 5}
+deep: {center: ["0.1", "0.2", "0.3"], magnification: 10}
 image: {width: 64, height: 64}
 camera: {position: [0, -3, 0]}
 renderer: {type: cut_plane, plane: {corners: [[-1, -1, 0], [1, -1, 0], [-1, 1, 0]]}}

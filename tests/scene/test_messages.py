@@ -42,6 +42,39 @@ camera: {projection: orthographic, §fov: 45}
 camera: §3 => camera: must be a mapping, got 3
 camera:§ => camera: must be a mapping, got nothing
 §camra: {} => unknown key 'camra'; did you mean 'camera'?
+# A place of any depth.
+camera: {}
+deep: §3 => deep: must be a mapping, got 3
+camera: {}
+deep: {§centre: [0, 0, 0]} => deep: unknown key 'centre'; did you mean 'center'?
+camera: {}
+deep: {center: §[0, 1]} => deep.center: must be a list of 3 numbers, got a list of 2
+camera: {}
+deep: {center: ["0.1", §0.1.2, 0]} => deep.center.1: must be a decimal number of at most 1000 digits, got '0.1.2'
+camera: {}
+deep: {center: [0, §"1e7", 0]} => deep.center.1: must be from -1,000,000 to 1,000,000, got 1e7
+camera: {}
+deep: {center: [0, §true, 0]} => deep.center.1: must be a number, or one in quotes
+camera: {}
+deep: {magnification: §0.5} => deep.magnification: must be at least 1, got 0.5
+camera: {}
+deep: {magnification: §1e121} => deep.magnification: must be at most 1e+120, got 1e+121
+camera: {frame: §seen}
+deep: {} => camera.frame: seen cannot be combined with deep; use all
+camera: {}
+deep: {}
+objects: {a: {type: §formula, formula: {name: hast}}}
+=> objects.a.type: formula cannot be combined with deep; remove one of them
+camera: {}
+deep: {}
+objects: {a: {type: sphere, join: §cut}} => objects.a.join: cut cannot be combined with deep; remove one of them
+camera: {}
+deep: {}
+renderer: {type: volume}
+objects: {a: §{type: sphere}} => objects.a: an object in a volume cannot be combined with deep; remove one of them
+camera: {}
+deep: {}
+lights: [{type: §set}] => lights.0.type: set cannot be combined with deep; remove one of them
 # The rest.
 image: {width: §0} => image.width: must be at least 1, got 0
 image: {width: §1.5} => image.width: must be a whole number, got 1.5

@@ -45,6 +45,8 @@ VALUES: dict[str, st.SearchStrategy[Any]] = {
     "formula.iterations": st.integers(-1, 200),
     "formula.name": st.sampled_from(["mandelbulb", "mandelbox", "hast", "no such formula"]),
     "formula.live": st.sampled_from([[], ["power"], ["nothing"]]),
+    "deep": st.sampled_from([None, {}, {"center": ["0.1", 0.2, "3e-1"]}, {"center": ["x", 0, 0]}, {"at": 3}]),
+    "deep.magnification": st.floats(0.5, 1e121),
     "image.width": st.integers(-1, 4000),
     "renderer.samples": st.integers(0, 70_000),
     # (Of another type are other keys: panels replace the section.)
