@@ -29,6 +29,7 @@ _WORDS: Mapping[Kind, str] = {
     "place": "a place in space",
     "direction": "a direction",
     "color": "each number by itself",
+    "exact": "a place of any depth",
 }
 
 
@@ -114,8 +115,8 @@ def _moves(scene: Scene, animation: Animation) -> list[str]:
     return lines
 
 
-def _value(value: float | tuple[float, ...]) -> str:
-    return _point(value) if isinstance(value, tuple) else f"{value:.6g}"
+def _value(value: float | tuple[float, ...] | tuple[str, ...]) -> str:
+    return _point(tuple(map(float, value))) if isinstance(value, tuple) else f"{value:.6g}"
 
 
 def _eyes(scene: Scene) -> list[str]:

@@ -4,8 +4,9 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Field, Tag
+from pydantic import Discriminator, Field, Tag
 
+from clfractal.scene.deep import LARGEST_MAGNIFICATION, ExactPosition
 from clfractal.schema.base import Number, Section, chosen_by_list, problem, rule
 from clfractal.schema.hex_color import AlsoAs
 
@@ -18,14 +19,27 @@ Share = Annotated[float, Field(strict=True, ge=0, le=1, allow_inf_nan=False)]
 Beyond = Annotated[float, Field(strict=True, ge=-10, le=10, allow_inf_nan=False)]
 Moment = Annotated[float, Field(strict=True, ge=0, le=MAX_FRAMES, allow_inf_nan=False)]
 Text = Annotated[str, Field(strict=True, min_length=1, max_length=10_000)]
+# (A magnification may be as large.)
+Magnitude = Annotated[
+    float, Field(strict=True, ge=-LARGEST_MAGNIFICATION, le=LARGEST_MAGNIFICATION, allow_inf_nan=False)
+]
+
+
+def _shape(value: Any) -> str:
+    if not isinstance(value, (list, tuple)):
+        return "one"
+    return "exact" if any(isinstance(each, str) for each in value) else "several"
+
+
 Value = Annotated[
-    Annotated[Number, Tag("one")]
+    Annotated[Magnitude, Tag("one")]
     | Annotated[
-        tuple[Number, ...],
+        tuple[Magnitude, ...],
         Field(strict=False, min_length=2, max_length=16),
         Tag("several"),
-    ],
-    Field(discriminator=chosen_by_list("several", "one")),
+    ]
+    | Annotated[ExactPosition, Tag("exact")],
+    Discriminator(_shape),
 ]
 Texts = Annotated[
     Annotated[Text, Tag("one")]
@@ -64,8 +78,19 @@ class Key(Section):
 
     @property
     def values(self) -> tuple[float, ...]:
-        """The value as a tuple."""
-        return self.value if isinstance(self.value, tuple) else (self.value,)
+        """The value as a tuple; an exact place rounded."""
+        return tuple(map(float, self.value)) if isinstance(self.value, tuple) else (self.value,)
+
+    @property
+    def texts(self) -> tuple[str, ...]:
+        """The same with all digits."""
+        parts = self.value if isinstance(self.value, tuple) else (self.value,)
+        return tuple(part if isinstance(part, str) else repr(part) for part in parts)
+
+    @property
+    def is_exact(self) -> bool:
+        """Whether it is told by text of any number of digits."""
+        return isinstance(self.value, tuple) and isinstance(self.value[0], str)
 
 
 class Track(Section):

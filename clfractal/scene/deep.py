@@ -10,7 +10,7 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 
 from clfractal.formulas.place import Place
 from clfractal.schema.base import Section, problem
-from clfractal.schema.fields import SCALE
+from clfractal.schema.fields import EXACT, SCALE
 
 MOST_DIGITS = 1000
 """Of a coordinate."""
@@ -47,7 +47,7 @@ class Deep(Section):
     the scene, its camera, lights and objects, is told in the picture's units, as without it.
     """
 
-    center: ExactPosition = Field(
+    center: Annotated[ExactPosition, EXACT] = Field(
         ("0", "0", "0"),
         description="the place in the formula's space; numbers of more than 17 digits stand in quotes",
     )

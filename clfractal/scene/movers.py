@@ -25,6 +25,7 @@ from clfractal.scene.curves import (
 )
 from clfractal.scene.flight import Around, Distance, EvenTarget
 from clfractal.scene.model import Scene
+from clfractal.scene.moved_place import MovedPlace
 from clfractal.scene.reads import TABLE
 from clfractal.scene.tracks import Target, is_camera_place
 
@@ -47,14 +48,18 @@ class Mover:
         name: its key.
         target: what it moves.
         at: the values by frame.
+        exact: the same as text, of a value that has more digits than numbers; None: of others.
     """
 
     name: str
     target: Target
     at: At
+    exact: Callable[[float], tuple[str, ...]] | None = None
 
     def value(self, frame: float) -> Any:
         """The value as the scene has it: a number, or a tuple of them."""
+        if self.exact is not None:
+            return self.exact(frame)
         found = self.at(frame)
         if self.target.kind == "whole":
             if not isfinite(found[0]):
@@ -94,6 +99,9 @@ class Movers:
         track, target = self.animation.tracks[name], self.targets[name]
         if track.around_target is not None and not is_camera_place(self.scene, target.path):
             raise self._wrong(name, "around_target", "applies to a camera's position")
+        if track.keys is not None and target.kind == "exact":
+            place = self._moved_place(name)
+            return Mover(name, target, lambda frame: tuple(map(float, place(frame))), place)
         if track.keys is not None:
             at = self._by_keys(name)
         elif track.expression is not None:
@@ -149,6 +157,9 @@ class Movers:
         track = self.animation.tracks[name]
         assert track.keys is not None
         self._check_size(name, "keys.0.value", len(track.keys[0].values))
+        for index, key in enumerate(track.keys):
+            if key.is_exact and self.targets[name].kind != "exact":
+                raise self._wrong(name, f"keys.{index}.value", "must be numbers, without quotes")
         times = [self.animation.frame_of(key) for key in track.keys]
         values = [key.values for key in track.keys]
         if self.targets[name].kind == "direction":
@@ -275,6 +286,20 @@ class Movers:
         if min(ways) <= 0:
             return None
         return EvenTarget(times, targets, Distance(times, ways, closed=closed), closed=closed)
+
+    def _moved_place(self, name: str) -> Callable[[float], tuple[str, ...]]:
+        """The centre of a place of any depth."""
+        times, _, _ = self._keys(name)
+        keys = self.animation.tracks[name].keys or ()
+        texts = [key.texts for key in keys]
+        texts += texts[:1] if len(times) > len(texts) else []  # the ring's first key once more
+        magnified = self.names.get((*self.targets[name].path[:-1], "magnification"))
+        deep = self.scene.deep
+        fixed = deep.magnification if deep is not None else 1.0
+        at = self._mover(magnified).at if magnified is not None else lambda frame: (fixed,)
+        place = MovedPlace(times, texts, self._ways(name, len(times) - 1), lambda frame: at(frame)[0])
+        clock = self._clock(name)
+        return lambda frame: place.at(clock(frame), at(frame)[0])
 
     # -- expressions and tables
 

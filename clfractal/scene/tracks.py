@@ -13,7 +13,7 @@ from clfractal.scene.model import Scene
 from clfractal.scene.objects import FormulaObject
 from clfractal.scene.volume import Box
 from clfractal.schema.base import Section
-from clfractal.schema.fields import SCALE, WHOLE, Kind, Moves, known
+from clfractal.schema.fields import EXACT, SCALE, WHOLE, Kind, Moves, known
 
 # Mappings of sections, and what they hold.
 _NAMED = {"objects": "object", "materials": "material"}
@@ -131,7 +131,7 @@ def _kind(scene: Scene, owner: Any, path: tuple[str, ...], value: Any) -> Kind:
         return "whole" if _is_whole(scene, path) else "number"
     if isinstance(owner, Section):
         moves = known(type(owner), key, Moves)
-        if moves is not None and moves in (SCALE, WHOLE):
+        if moves is not None and moves in (EXACT, SCALE, WHOLE):
             return moves.kind
         if value is None:
             annotation = str(type(owner).model_fields[key].annotation)

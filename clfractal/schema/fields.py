@@ -9,11 +9,12 @@ from typing import Annotated, Any, Literal, TypeAlias, TypeVar, Union, get_args,
 
 from pydantic import BaseModel
 
-Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color"]
+Kind: TypeAlias = Literal["number", "whole", "scale", "place", "direction", "color", "exact"]
 """How a value goes from key to key.
 
 `number`: as it is, angles too, which are never wrapped; `whole`: the same, then rounded; `scale`: in the logarithm;
-`place`: on a path in space; `direction`: on the sphere; `color`: each component as a number.
+`place`: on a path in space; `direction`: on the sphere; `color`: each component as a number; `exact`: a place
+told by text of many digits, as evenly as what is magnified there allows.
 """
 Known = TypeVar("Known")
 
@@ -37,7 +38,7 @@ SCALE = Moves("scale")
 """What is a factor to the eye, so that equal factors in equal times look even."""
 WHOLE = Moves("whole")
 """A whole number between which a picture's subject changes, and not how it is made."""
-PLACE, DIRECTION = Moves("place"), Moves("direction")
+PLACE, DIRECTION, EXACT = Moves("place"), Moves("direction"), Moves("exact")
 
 
 def known(section: type[BaseModel], name: str, of: type[Known]) -> Known | None:

@@ -271,12 +271,19 @@ def _entries(value: Any) -> Mapping[str, Any]:
 
 def _is_value(value: Any) -> bool:
     if isinstance(value, tuple):
-        return 2 <= len(value) <= 16 and all(type(each) is float for each in value)
+        return 2 <= len(value) <= 16 and (all(type(each) is float for each in value) or _is_exact(value))
     return type(value) in (int, float)
+
+
+def _is_exact(value: Any) -> bool:
+    """Whether it may be a place that is told by text."""
+    return isinstance(value, tuple) and len(value) == 3 and all(type(each) is str for each in value)
 
 
 def _same(one: Any, other: Any) -> bool:
     """Whether two values are equal but for rounding, as on the way through a track."""
+    if _is_exact(one) or _is_exact(other):
+        return bool(one == other)
     first, second = ((each if isinstance(each, tuple) else (each,)) for each in (one, other))
     return len(first) == len(second) and same(first, second)
 

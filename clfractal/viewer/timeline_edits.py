@@ -204,8 +204,11 @@ def with_value(animation: Animation, at: KeyAt, value: Any) -> Animation:
 def with_number(animation: Animation, at: KeyAt, component: int, number: float) -> Animation:
     """A key with another number in one place of its value."""
     key = key_of(animation, at)
-    values = [*key.values[:component], number, *key.values[component + 1 :]]
-    return with_value(animation, at, values if isinstance(key.value, tuple) else number)
+    if not isinstance(key.value, tuple):
+        return with_value(animation, at, number)
+    # (The others keep their digits.)
+    new = repr(number) if key.is_exact else number
+    return with_value(animation, at, [*key.value[:component], new, *key.value[component + 1 :]])
 
 
 def with_way(animation: Animation, selection: Selection, word: Interpolation | None) -> Animation:
@@ -315,7 +318,9 @@ def key_of(animation: Animation, at: KeyAt) -> Key:
 
 
 def _valued(value: Any) -> Any:
-    return tuple(map(float, value)) if isinstance(value, (list, tuple)) else float(value)
+    if not isinstance(value, (list, tuple)):
+        return float(value)
+    return tuple(each if isinstance(each, str) else float(each) for each in value)
 
 
 def _time(animation: Animation, frame: float, *, in_seconds: bool) -> dict[str, float]:
