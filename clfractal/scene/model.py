@@ -15,7 +15,7 @@ from clfractal.errors import ClfractalError, SceneError, Where
 from clfractal.errors.arguments import plain
 from clfractal.files.inputs import noting
 from clfractal.scene.animation import Animation
-from clfractal.scene.bookmarks import Bookmarks
+from clfractal.scene.bookmarks import Bookmark, Bookmarks, bookmark, view_of
 from clfractal.scene.coloring import Coloring
 from clfractal.scene.cut_plane import CutPlaneRenderer, CutPlanes
 from clfractal.scene.deep import Deep, check_frames
@@ -96,7 +96,7 @@ class Scene(Section):
     animation: Animation | None = Field(
         None, description="values that change from frame to frame of a film; null: a still"
     )
-    bookmarks: Bookmarks = Field({}, description="cameras kept under names; they do not change the picture")
+    bookmarks: Bookmarks = Field({}, description="cameras kept under names, {camera, deep} in a place of any depth; they do not change the picture")
 
     # Not fields: they are not part of the scene's values, and not compared.
     _folder: Path = PrivateAttr(default_factory=Path)
@@ -126,13 +126,14 @@ class Scene(Section):
     def _frame(self) -> None:
         views = self.layout.views if self.layout is not None else ()
         own = [view.camera for view in views if view.camera is not None]
-        if all(camera.frame is None for camera in (self.camera, *own, *self.bookmarks.values())):
+        marked = [view_of(each)[0] for each in self.bookmarks.values()]
+        if all(camera.frame is None for camera in (self.camera, *own, *marked)):
             return
         check_frames(self)
         try:
             seen = [view for view, _ in self.views] if self.layout is not None else []
             self._settle(camera=self._framed(self.camera))
-            self._settle(bookmarks={name: self._framed(each) for name, each in self.bookmarks.items()})
+            self._settle(bookmarks={name: self._framed_mark(each) for name, each in self.bookmarks.items()})
         except ClfractalError:
             return  # told by the checks that follow
         finally:
@@ -144,6 +145,13 @@ class Scene(Section):
                 for view, scene in zip(views, seen, strict=True)
             ]
             self._settle(layout=self.layout.model_copy(update={"views": placed}))
+
+    def _framed_mark(self, mark: Bookmark) -> Bookmark:
+        camera, deep = view_of(mark)
+        if camera.frame is None:
+            return mark
+        there = self if deep == self.deep else self.model_copy(update={"deep": deep, "bookmarks": {}})
+        return bookmark(there._framed(camera), deep)
 
     def _framed(self, camera: AnyCamera) -> AnyCamera:
         if camera.frame is None:

@@ -208,17 +208,25 @@ def rule(check: Callable[[S], None]) -> Any:
     return model_validator(mode="after")(keep)
 
 
-class ChosenBy:
-    """For a union of sections: the word under a key chooses one of them, and without the key it is the default's."""
+class Chosen:
+    """For a union of sections: a function gives the tag of the one that a value is."""
 
-    def __init__(self, key: str, default: str) -> None:
-        self.key, self.default = key, default
+    def __init__(self, choose: Callable[[Any], str]) -> None:
+        self.choose = choose
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         """As pydantic's unions of which a function chooses."""
-        found = Discriminator(self._choose).__get_pydantic_core_schema__(source, handler)
+        found = Discriminator(self.choose).__get_pydantic_core_schema__(source, handler)
         # Written as what it is: pydantic cannot look into sections made later to choose between them.
         return {**found, "serialization": plain_serializer_function_ser_schema(lambda section: section)}
+
+
+class ChosenBy(Chosen):
+    """For a union of sections: the word under a key chooses one of them, and without the key it is the default's."""
+
+    def __init__(self, key: str, default: str) -> None:
+        super().__init__(self._choose)
+        self.key, self.default = key, default
 
     def __get_pydantic_json_schema__(self, schema: Any, handler: Any) -> dict[str, Any]:
         """One of the sections. All but the default need their word: else a mapping without it would be all of them."""

@@ -200,7 +200,7 @@ def _kind(details: ErrorDetails, place: _Place, _: Root) -> Problem:
     """The message for a word that should choose a class but is unknown."""
     key = "projection" if any("projection" in m.model_fields for m in place.models) else "type"
     given = details["input"].get(key)
-    tags = [_tag(model) for model in place.models]
+    tags = [_tag(model) for model in place.models if key in model.model_fields]
     path = (*place.path, key)
     if not isinstance(given, str):
         return Problem(path, f"must be {' or '.join(tags)}, got {shown(given)}")

@@ -106,6 +106,8 @@ _TABLE: Mapping[str, tuple[tuple[str, str, str], ...]] = {
         ("view_bottom", "Shift+7 Ctrl+Num7", "from the top, the bottom"),
         ("projection", "5 Num5", "perspective or orthographic"),
         ("orbit_style", "O", "turntable or free orbit"),
+        ("copy_place", "Ctrl+Shift+C", "copy this place, with all digits; go to the copied one"),
+        ("paste_place", "Ctrl+V", "copy this place, with all digits; go to the copied one"),
         ("bookmark_add", "B", "keep this view as a bookmark"),
         *((f"bookmark_{n}", f"Ctrl+{n}", "go to a bookmark") for n in range(1, 10)),
     ),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from clfractal.camera.views import View, scene_view
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.deeper import magnification_of, told_anew
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.rectangle import Plane
@@ -70,6 +71,9 @@ def aimed(scene: Scene, pick: Pick) -> Aim:
     elif isinstance(scene.renderer, CutPlaneRenderer):
         plane_path = "renderer.plane"
     seen = seen.model_copy(update={"image": shown.image})
+    # The picture may be of another place, from before the scene went deeper.
+    depth = pick.depth * magnification_of(seen.deep) / magnification_of(shown.deep)
+    point = None if pick.point is None else told_anew(pick.point, shown.deep, seen.deep)
     squeezed = (pick.view.eye.wide, pick.view.eye.high)
     middle = scene_view(seen, MIDDLE if seen.stereo is None else pick.view.eye.__class__("middle", *squeezed))
     return Aim(
@@ -79,14 +83,15 @@ def aimed(scene: Scene, pick: Pick) -> Aim:
         pick.x,
         pick.y,
         pick.size,
-        pick.depth,
-        pick.point,
+        depth,
+        point,
         middle,
-        _pivot(seen, pick),
+        told_anew(_pivot(seen, pick), shown.deep, seen.deep) if point is None else point,
     )
 
 
 def _pivot(scene: Scene, pick: Pick) -> tuple[float, float, float]:
-    if pick.point is not None or pick.depths is None or isinstance(scene.renderer, CutPlaneRenderer):
-        return pick.point or scene.camera.target
+    """Of the picture's own place."""
+    if pick.depths is None or isinstance(scene.renderer, CutPlaneRenderer):
+        return told_anew(scene.camera.target, scene.deep, pick.view.scene.deep)
     return vector(sight_in(scene, pick.view, pick.depths).pivot())

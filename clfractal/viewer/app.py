@@ -16,6 +16,7 @@ from clfractal.scene.stereo import MIDDLE
 from clfractal.viewer import marked_lines as marks
 from clfractal.viewer import window
 from clfractal.viewer.begin import Begun
+from clfractal.viewer.deeper_moves import DeeperMoves
 from clfractal.viewer.depth_range import DepthRange
 from clfractal.viewer.input_events import Inputs
 from clfractal.viewer.measuring import Measuring
@@ -58,7 +59,7 @@ class Viewer(Workspace):
         self.own_screen = OwnScreen(self.studio)
         self.depth_range, self.room = DepthRange(), Room()
         self.pads = window.Pads()
-        self.operators = Operators(self)
+        self.operators, self.deeper = Operators(self), DeeperMoves(self.studio, self.controls, self.motion)
         self.operators.scene.first_stereo = self.screen
         self.inputs = Inputs(self, self.operators, begun.recording)
         self._hidden, self._measuring = False, Measuring(begun.options)
@@ -123,6 +124,7 @@ class Viewer(Workspace):
         if self.player.step(now):
             self._redraw = max(self._redraw, 1)
         self._take_settings()
+        self.deeper.look()
         self.controls.rest(now)
         self.files.tick(now, self.settings, dragging=self.controls.dragging, played=self.inputs.played)
         self._follow(now)
@@ -181,7 +183,7 @@ class Viewer(Workspace):
             self._told = told
             self.redraw()
         self.surface.want(self.studio.frame, self.studio.look)
-        self.motion.depth = self.meter.nearest(self.surface.shown)
+        self.motion.depth = self.meter.nearest(self.surface.shown, self.studio.scene.deep)
 
     def _rest(self, hidden: bool) -> None:
         """A window that nobody sees gathers no samples."""

@@ -52,8 +52,8 @@ def _cameras(data: Any) -> Iterator[Path]:
         views = _at(data, ("layout", "views"))
         for number in range(len(views) if isinstance(views, list) else 0):
             yield ("layout", "views", number, "camera")
-        for name in _at(data, ("bookmarks",)) or ():
-            yield ("bookmarks", name)
+        for name, mark in (_at(data, ("bookmarks",)) or {}).items():
+            yield ("bookmarks", name, "camera") if "camera" in mark else ("bookmarks", name)
 
 
 def _place(camera: Any) -> list[Any]:

@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any
 
 from clfractal.images.modes import eye_at
+from clfractal.scene.deeper import Exact, exact_point
 from clfractal.scene.parts import OrthographicCamera
 from clfractal.scene.rectangle import Plane
 from clfractal.scene.volume import VolumeRenderer
@@ -53,6 +54,7 @@ class Controls:
         region_now: the corner opposite.
         focusing: whether the next click sets what is sharp.
         choosing_region: whether the next drag draws the region to refine.
+        toward: the point of the formula's space that the wheel brought nearer last.
     """
 
     def __init__(self, studio: Studio, settings: Settings, motion: Motion) -> None:
@@ -63,6 +65,7 @@ class Controls:
         self.choosing_region = False
         self.region_start: Place | None = None
         self.region_now: Place | None = None
+        self.toward: Exact | None = None
         self._drag: Drag | None = None
         self._clicked: tuple[float, Place] = (-10.0, (0.0, 0.0))
         self._wheeled = 0.0
@@ -134,6 +137,8 @@ class Controls:
         elif aim.plane is not None:
             self._set_plane(aim, plane_moves.zoom_to(aim.plane, aim.x, aim.y, aim.size, factor), "wheel")
         else:
+            if aim.point is not None:
+                self.toward = exact_point(aim.point, aim.scene.deep)
             camera = navigation.zoom_to(aim.camera, aim.x, aim.y, aim.size, factor, aim.depth, view=aim.view)
             self._set_camera(aim, camera, "wheel")
 

@@ -71,6 +71,11 @@ class Fly:
         if isfinite(steps):
             self.factor = min(max(self.factor * 2.0 ** min(max(steps / 4, -12), 12), SLOWEST), FASTEST)
 
+    def scale(self, factor: float) -> None:
+        """Lengths are told in other units."""
+        if self._distance is not None:
+            self._distance *= factor
+
     def stop(self) -> None:
         """Stops at once, for example when the window loses the keyboard."""
         self._pace = np.zeros(4)

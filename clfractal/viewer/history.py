@@ -10,11 +10,13 @@ from clfractal.scene.model import Scene
 
 Kind = Literal["camera", "scene"]
 MOST_STEPS = 500
+# A camera stands in a place: what puts one back puts the other back, too.
+_VIEW = ("camera", "deep")
 
 
 def kind_of(sections: Mapping[str, Any]) -> Kind:
     """The stack that an edit of these sections belongs to."""
-    return "camera" if set(sections) == {"camera"} else "scene"
+    return "camera" if set(sections) <= set(_VIEW) else "scene"
 
 
 @dataclass(slots=True)
@@ -53,6 +55,8 @@ class History:
         changed = [name for name in Scene.model_fields if getattr(before, name) != getattr(after, name)]
         if not changed:
             return
+        if any(name in changed for name in _VIEW):
+            changed = [name for name in Scene.model_fields if name in changed or name in _VIEW]
         old = {name: getattr(before, name) for name in changed}
         new = {name: getattr(after, name) for name in changed}
         stack = self._stacks[kind_of(new)]
@@ -64,6 +68,15 @@ class History:
             return
         stack.done.append(Step(old, new, gesture, frame))
         del stack.done[:-MOST_STEPS]
+
+    def retell(self, before: Scene, after: Scene, frame: float | None = None) -> None:
+        """A view was told by other numbers: that belongs to the step that led to it, if the last one did."""
+        done = self._stacks["camera"].done
+        last = done[-1] if done else None
+        if last is None or last.frame != frame or last.after.get("camera") != before.camera:
+            self.add(before, after, None, frame)
+            return
+        last.after = {**last.after, **{name: getattr(after, name) for name in _VIEW}}
 
     def seal(self) -> None:
         """Ends a gesture: the next edit is a step of its own, whatever it is called."""

@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.scene.deep import Deep
+from clfractal.scene.deeper import camera_told_anew, magnification_of
 from clfractal.scene.parts import AnyCamera
 from clfractal.viewer.flying import Fly, Key
 from clfractal.viewer.navigation import dolly, interpolated, orbit, pan
@@ -60,6 +62,18 @@ class Motion:
         self.keys.clear()
         self.fly.stop()
         self._from, self._to, self._start = self.studio.scene.camera, camera, now
+
+    def told_anew(self, before: Deep | None, after: Deep | None) -> None:
+        """The scene shows another place: a move that is under way goes on there.
+
+        Raises:
+            SceneError: it would leave the range of coordinates.
+        """
+        self.fly.scale(magnification_of(after) / magnification_of(before))
+        self.depth = float("inf")
+        if self._from is not None and self._to is not None:
+            self._from = camera_told_anew(self._from, before, after)
+            self._to = camera_told_anew(self._to, before, after)
 
     def stop(self) -> None:
         """Ends all moves where the camera is."""

@@ -12,6 +12,7 @@ from clfractal.device.select import choose, devices
 from clfractal.viewer import timeline_view
 from clfractal.viewer.flying import Key
 from clfractal.viewer.panels import all_panels, keyboard
+from clfractal.viewer.place_text import place_text, with_place
 from clfractal.viewer.scene_operators import SceneOperators
 from clfractal.viewer.workspace import Workspace
 
@@ -78,6 +79,8 @@ class Operators:
             "save_as": self._switch("save"),
             "reload": files.reload,
             "copy": self._copy,
+            "copy_place": self._copy_place,
+            "paste_place": self._paste_place,
             "screenshot": files.screenshot,
             "screenshot_panels": lambda: files.screenshot(panels=True),
             "export": files.export,
@@ -196,6 +199,16 @@ class Operators:
     def _copy(self) -> None:
         self.workspace.window.clipboard(self.workspace.files.text())
         self.workspace.studio.tell("the scene is in the clipboard")
+
+    def _copy_place(self) -> None:
+        self.workspace.window.clipboard(place_text(self.workspace.studio.scene))
+        self.workspace.studio.tell("the place is in the clipboard")
+
+    def _paste_place(self) -> None:
+        studio, text = self.workspace.studio, self.workspace.window.from_clipboard()
+        found = with_place(studio.scene, text)
+        self.workspace.motion.stop()
+        studio.set_view(found.camera, found.deep)
 
     def _pause(self) -> None:
         session, paused = self.workspace.studio.session, not self.workspace.studio.session.paused

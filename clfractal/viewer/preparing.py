@@ -10,6 +10,7 @@ from clfractal.device.cancel import CancelToken
 from clfractal.engine.job import Job
 from clfractal.errors import ClfractalError, DeviceError, Stopped
 from clfractal.integrators.kept import Kept
+from clfractal.scene.deeper import camera_told_anew
 from clfractal.scene.model import Scene
 from clfractal.viewer.frame import Frame
 from clfractal.viewer.kept_view import cameras_of, with_cameras
@@ -84,7 +85,11 @@ class Preparation:
 def seen_from(scene: Scene, by: Scene) -> Scene | None:
     """A scene as another one looks at it: by its cameras, in its size, for its screen; None if that is not possible."""
     try:
-        seen = with_cameras(scene, cameras_of(by)[: len(cameras_of(scene))])
+        cameras = [
+            each if each is None else camera_told_anew(each, by.deep, scene.deep)
+            for each in cameras_of(by)[: len(cameras_of(scene))]
+        ]
+        seen = with_cameras(scene, cameras)
         if seen.image == by.image and seen.stereo == by.stereo:
             return seen
         return seen.model_copy(update={"image": by.image, "stereo": by.stereo})

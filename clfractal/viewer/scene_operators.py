@@ -8,9 +8,11 @@ from functools import partial
 from typing import Any
 
 from clfractal.errors import ClfractalError
+from clfractal.scene.bookmarks import bookmark, view_of
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.deep import Deep
 from clfractal.scene.object_checks import can_show
-from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
+from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.rectangle import Axis, Plane
 from clfractal.scene.renderer import RENDERERS
 from clfractal.scene.stereo import Mode
@@ -178,8 +180,11 @@ class SceneOperators:
             section = dict(self.studio.value(aim.plane_path))
             self._edit({aim.plane_path: {"normal": section.get("normal", [0.0, 0.0, 1.0])}})
             return
-        studio = self.studio
-        self._camera(standard_views.frame_all(self.motion.target, studio.scene.extent, studio.viewport))
+        studio, scene = self.studio, self.studio.scene
+        whole = None if scene.animation is None else scene.deep  # which its tracks may move
+        if whole != scene.deep:
+            scene = scene.model_copy(update={"deep": None})
+        self._go_to(standard_views.frame_all(self.motion.target, scene.extent, studio.viewport), whole)
 
     def switch_projection(self) -> None:
         """Perspective to orthographic and back, with what is at the target's depth in the same size."""
@@ -218,7 +223,8 @@ class SceneOperators:
         """Keeps the camera under a free name."""
         marks = dict(self.studio.value("bookmarks") or {})
         number = next(n for n in range(1, len(marks) + 2) if f"view {n}" not in marks)
-        marks[f"view {number}"] = self.studio.scene.camera.model_dump(mode="json")
+        scene = self.studio.scene
+        marks[f"view {number}"] = bookmark(scene.camera, scene.deep).model_dump(mode="json")
         if self._edit({"bookmarks": marks}):
             self.studio.tell(f"bookmark: view {number}")
 
@@ -228,7 +234,15 @@ class SceneOperators:
         if number > len(marks):
             self.studio.tell(f"there is no bookmark {number}", wrong=True)
         else:
-            self._camera(marks[number - 1])
+            self._go_to(*view_of(marks[number - 1]))
+
+    def _go_to(self, camera: AnyCamera, deep: Deep | None) -> None:
+        """Moves the camera, on a way to be seen within a place."""
+        if deep == self.studio.scene.deep:
+            self._camera(camera)
+        else:
+            self.motion.stop()
+            self.studio.set_view(camera, deep)
 
     # Planes, zooms
 

@@ -7,6 +7,8 @@ from collections import deque
 
 import numpy as np
 
+from clfractal.scene.deep import Deep
+from clfractal.scene.deeper import magnification_of
 from clfractal.viewer.display import Shown
 from clfractal.viewer.panels.ui import Speed
 
@@ -40,8 +42,12 @@ class Meter:
         moving = len(times) > 2 and time.perf_counter() - times[-1] < 0.5 and times[-1] > times[0]
         return Speed((len(times) - 1) / (times[-1] - times[0]) if moving else 0.0)
 
-    def nearest(self, shown: Shown | None) -> float:
-        """Depth of the nearest surface in the picture, scene units; infinite if none is in sight."""
+    def nearest(self, shown: Shown | None, deep: Deep | None) -> float:
+        """Depth of the nearest surface in the picture, scene units; infinite if none is in sight.
+
+        Args:
+            deep: the place that the scene shows now; the picture may be of another.
+        """
         if shown is None:
             return float("inf")
         if self._depth[0] is not shown:
@@ -53,4 +59,5 @@ class Meter:
                 if finite.size:
                     nearest = min(nearest, float(finite.min()))
             self._depth = (shown, nearest)
-        return self._depth[1]
+        own = shown.frame.views[0].scene.deep
+        return self._depth[1] * magnification_of(deep) / magnification_of(own)

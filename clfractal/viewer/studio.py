@@ -16,11 +16,12 @@ from typing import Any
 from clfractal.device.select import Device
 from clfractal.engine.show import Look
 from clfractal.errors import ClfractalError
+from clfractal.scene.deep import Deep
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
 from clfractal.scene.stereo import Stereo
 from clfractal.viewer.background import Still, Thumbnail
-from clfractal.viewer.editing import edited, value_at
+from clfractal.viewer.editing import edited, replaced, value_at
 from clfractal.viewer.film_queue import FilmQueue
 from clfractal.viewer.filming import MOVING_SECONDS, InFilm
 from clfractal.viewer.formula_texts import FormulaTexts
@@ -151,6 +152,26 @@ class Studio(InFilm):
             self.tell(f"camera: {error}", wrong=True)
             return
         self._replace(changed, gesture)
+
+    def set_view(self, camera: Camera, deep: Deep | None) -> None:
+        """Another camera in a place of any depth, as a step of the camera's own undo."""
+        if deep == self.scene.deep:
+            self.set_camera(camera)
+            return
+        try:
+            changed = self._tied(replaced(self.scene, {"camera": camera, "deep": deep}))
+        except ClfractalError as error:
+            self.tell(str(error), wrong=True)
+            return
+        self._replace(changed, None)
+
+    def retell(self, scene: Scene) -> None:
+        """The same view by other numbers, see `scene.deeper`: no step of undo by itself, and a movement goes on."""
+        before = self.scene
+        scene, place = self._auto_keyed(scene)
+        self.history.retell(before, scene, place.frame if place is not None else None)
+        self.scene, self.place = scene, place
+        self.refresh()
 
     def set_scene(self, scene: Scene, gesture: str | None = None) -> None:
         """Another scene in the place of this one, as a step that can be undone (a variation, for example)."""

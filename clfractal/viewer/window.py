@@ -290,6 +290,11 @@ class Window:
         """Puts a text into the clipboard."""
         glfw.set_clipboard_string(self.handle, text)
 
+    def from_clipboard(self) -> str:
+        """The text in the clipboard; empty if there is none."""
+        found = glfw.get_clipboard_string(self.handle)
+        return found.decode("utf-8", "replace") if found else ""
+
     def raise_to_front(self) -> None:
         """Asks for the keyboard."""
         glfw.focus_window(self.handle)

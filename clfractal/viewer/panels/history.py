@@ -7,6 +7,7 @@ from typing import Any
 
 from imgui_bundle import imgui, imgui_ctx
 
+from clfractal.scene.bookmarks import bookmark, view_of
 from clfractal.viewer.history import Kind, Step
 from clfractal.viewer.panels import right_dock, theme
 from clfractal.viewer.panels import widgets as w
@@ -239,13 +240,14 @@ def go_to_bookmark(ui: Ui, number: int, name: str) -> None:
     if number <= 9:
         ui.act(f"bookmark_{number}")
     else:
-        ui.studio.set_camera(ui.studio.scene.bookmarks[name])
+        ui.studio.set_view(*view_of(ui.studio.scene.bookmarks[name]))
 
 
 def add(ui: Ui, name: str) -> bool:
     """Keeps the present camera under a name; whether that was possible."""
     marks = _plain_marks(ui)
-    return _is_free(ui, name) and _put(ui, {**marks, name: w.plain(ui.studio.scene.camera)})
+    scene = ui.studio.scene
+    return _is_free(ui, name) and _put(ui, {**marks, name: w.plain(bookmark(scene.camera, scene.deep))})
 
 
 def rename(ui: Ui, old: str, new: str) -> bool:

@@ -9,6 +9,7 @@ from imgui_bundle import imgui
 
 from clfractal.device import activity
 from clfractal.scene.cut_plane import CutPlaneRenderer
+from clfractal.scene.deeper import magnified
 from clfractal.scene.model import Scene
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
@@ -36,6 +37,8 @@ _FOR_NARROW = (
     "stereo",
     "parallax",
 )
+# From this magnification on the figures tell it.
+_DEEP = 100.0
 DRAFT = "Draft: light comes when it rests"
 _SPINNER = "|/-\\"
 
@@ -78,6 +81,8 @@ def _scene(ui: Ui) -> list[Pair]:
     if isinstance(renderer, SurfaceRenderer):
         method = f"{renderer.search}, {renderer.normal.replace('_', ' ')}"
         found += [("method", method), ("step", _step(scene, renderer))]
+        if scene.deep is not None or magnified(scene) >= _DEEP:
+            found.append(("zoom", number_text(magnified(scene))))
     elif isinstance(renderer, VolumeRenderer):
         found += [
             ("method", f"volume, {renderer.value}, {renderer.normals.replace('_', ' ')}"),
