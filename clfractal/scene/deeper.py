@@ -18,7 +18,7 @@ from clfractal.scene.deep import LARGEST_MAGNIFICATION, Deep
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import AnyCamera, OrthographicCamera, PerspectiveCamera
 from clfractal.scene.surface import SurfaceRenderer
-from clfractal.schema.base import Vector
+from clfractal.schema.base import Vector, dot, length, minus, unit
 
 Exact: TypeAlias = tuple[Fraction, Fraction, Fraction]
 
@@ -32,6 +32,8 @@ ENDS = 1e-2
 _NEAREST, _FARTHEST = STANDS / 4, STANDS * 4
 # How far a place may be from what is looked at, scene units: points far from it begin their orbits earlier.
 _REACH, _PAST_REACH = 6.0, 40.0
+# What is farther aside, as the cosine of an angle, tells nothing of how far one looks.
+_ASIDE = 0.2
 # Digits of a centre beyond those of one scene unit.
 _DIGITS = 22
 # What else has places and lengths in scene units, by what tells that it is there.
@@ -155,23 +157,22 @@ def settled(scene: Scene, toward: Vector | None = None) -> Scene:
     """The scene as it is told best after its camera has moved: the picture is the same, its numbers have digits to spare.
 
     Args:
-        toward: the point that the camera comes nearer to, scene units, where a place begins best; None: the target.
+        toward: the point that the camera comes nearer to, scene units: it says how far what is looked at is, and a place
+            begins best there; None: the target.
 
     A scene that is well told, or that has to stay (`why_it_stays`), is given back itself.
     """
-    if not is_far_off(scene) or why_it_stays(scene):
+    if not is_far_off(scene, toward) or why_it_stays(scene):
         return scene
     try:
-        return rebased(scene, _place_for(scene, toward))
+        aimed = scene.model_copy(update={"camera": _aimed(scene.camera, toward)})
+        return rebased(aimed, _place_for(aimed, toward))
     except ClfractalError:  # a camera far beside all that can be shown
         return scene
 
 
 def why_it_stays(scene: Scene) -> str:
     """Why a scene does not go over to another place by itself, as one line; empty: it does."""
-    for path, there in _TOLD_IN_SCENE_UNITS.items():
-        if there(scene):
-            return f"this scene is not shown deeper by itself: {path} would have to move along"
     if not isinstance(scene.renderer, SurfaceRenderer):
         return "a place is shown deeper by the surface renderer alone"
     if not isinstance(scene.camera, PerspectiveCamera):
@@ -180,12 +181,19 @@ def why_it_stays(scene: Scene) -> str:
         return "there is no formula to look deeper into"
     if scene.animation is not None and scene.deep is None:
         return "a film zooms deeper once its scene has a place: switch it on in the panel Place"
+    for path, there in _TOLD_IN_SCENE_UNITS.items():
+        if there(scene):
+            return f"this scene is not shown deeper by itself: {path} would have to move along"
     return ""
 
 
-def is_far_off(scene: Scene) -> bool:
-    """Whether the camera is so near to what it looks at, or so far from it, that another place tells the scene better."""
-    camera, deep = scene.camera, scene.deep
+def is_far_off(scene: Scene, toward: Vector | None = None) -> bool:
+    """Whether the camera is so near to what it looks at, or so far from it, that another place tells the scene better.
+
+    Args:
+        toward: as for `settled`.
+    """
+    camera, deep = _aimed(scene.camera, toward), scene.deep
     distance = dist(camera.position, camera.target)
     if deep is None:
         return distance < BEGINS * scene.chain.own_radius
@@ -196,6 +204,21 @@ def is_far_off(scene: Scene) -> bool:
         return True
     wanted = _magnification_for(deep, distance)
     return not _NEAREST <= distance <= _FARTHEST and wanted != deep.magnification
+
+
+def _aimed(camera: AnyCamera, toward: Vector | None) -> AnyCamera:
+    """The camera with a target as far away as a point that it comes nearer to; the picture stays."""
+    if toward is None:
+        return camera
+    axis, way = unit(camera.ahead), minus(toward, camera.position)
+    depth = dot(way, axis)
+    if not depth > _ASIDE * length(way):
+        return camera
+    x, y, z = (start + depth * along for start, along in zip(camera.position, axis, strict=True))
+    try:
+        return camera.model_copy(update={"target": (x, y, z)})
+    except ClfractalError:  # too near for the camera's coordinates
+        return camera
 
 
 def _goes_back(scene: Scene, distance: float) -> bool:

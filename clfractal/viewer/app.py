@@ -60,6 +60,7 @@ class Viewer(Workspace):
         self.depth_range, self.room = DepthRange(), Room()
         self.pads = window.Pads()
         self.operators, self.deeper = Operators(self), DeeperMoves(self.studio, self.controls, self.motion)
+        self.ui.memory["deeper"] = self.deeper
         self.operators.scene.first_stereo = self.screen
         self.inputs = Inputs(self, self.operators, begun.recording)
         self._hidden, self._measuring = False, Measuring(begun.options)

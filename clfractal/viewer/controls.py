@@ -85,6 +85,7 @@ class Controls:
         if aim is None or self._drag is not None:
             return
         self.motion.stop()
+        self.toward = None
         if button == LEFT and (self.focusing or mods & CONTROL):
             self.focus(aim)
             self.focusing = False

@@ -7,8 +7,10 @@ from typing import Any
 
 import numpy as np
 
+from clfractal.errors import ClfractalError
 from clfractal.scene.deep import Deep
 from clfractal.scene.deeper import camera_told_anew, magnification_of
+from clfractal.scene.model import Scene
 from clfractal.scene.parts import AnyCamera
 from clfractal.viewer.flying import Fly, Key
 from clfractal.viewer.navigation import dolly, interpolated, orbit, pan
@@ -63,17 +65,22 @@ class Motion:
         self.fly.stop()
         self._from, self._to, self._start = self.studio.scene.camera, camera, now
 
-    def told_anew(self, before: Deep | None, after: Deep | None) -> None:
-        """The scene shows another place: a move that is under way goes on there.
-
-        Raises:
-            SceneError: it would leave the range of coordinates.
-        """
+    def told_anew(self, before: Deep | None, present: Scene) -> None:
+        """The scene shows another place: a move that is under way goes on there, if it ends within reach."""
+        after = present.deep
         self.fly.scale(magnification_of(after) / magnification_of(before))
         self.depth = float("inf")
-        if self._from is not None and self._to is not None:
-            self._from = camera_told_anew(self._from, before, after)
+        if self._from is None or self._to is None:
+            return
+        try:
             self._to = camera_told_anew(self._to, before, after)
+        except ClfractalError:
+            self._to = None
+            return
+        try:
+            self._from = camera_told_anew(self._from, before, after)
+        except ClfractalError:  # out of reach already
+            self._from = present.camera
 
     def stop(self) -> None:
         """Ends all moves where the camera is."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from clfractal.scene.deeper import magnified
+from clfractal.viewer.deeper_moves import DeeperMoves
 from clfractal.viewer.panels import theme
 from clfractal.viewer.panels import widgets as w
 from clfractal.viewer.panels.ui import Ui
@@ -22,11 +23,22 @@ def draw(ui: Ui) -> None:
         for number, axis in enumerate(_AXES):
             _coordinate(ui, f"deep.center.{number}", axis)
         w.field(ui, "deep.magnification")
+        _follows(ui)
     if not w.filtering(ui):
         w.in_labels()
         w.act(ui, "copy_place", theme.COPY, "Copy the place and the camera as text", text="Copy")
         w.in_row(4)
         w.act(ui, "paste_place", "", "Go to the place that the clipboard tells", text="Paste")
+
+
+def _follows(ui: Ui) -> None:
+    moves: DeeperMoves | None = ui.memory.get("deeper")
+    if moves is None:
+        return
+    about = "as many more of them as details that small need; a number that is set by hand counts from then on"
+    path = "formula.iterations"
+    if w.switch(ui, "Iterations follow", moves.orbits.follow, path=path, name="place.follow", tip=about):
+        moves.orbits.switch()
 
 
 def _coordinate(ui: Ui, path: str, axis: str) -> None:
