@@ -12,6 +12,7 @@ import pytest
 
 import clfractal
 from clfractal import camera
+from clfractal.scene.bookmarks import view_of
 from tests.calls import failure
 from tests.shell import SCENE
 
@@ -133,12 +134,8 @@ def test_numbers_of_numpy_in_scenes() -> None:
     assert isinstance(changed.position[0], float)
     wider = scene.model_copy(update={"image": {"width": np.int64(64), "height": np.int64(48)}})
     assert (wider.image.width, type(wider.image.width)) == (64, int)
-    assert (
-        scene.model_copy(update={"bookmarks": {"a": {"position": np.zeros(3) + 2}}})
-        .bookmarks["a"]
-        .position[0]
-        == 2
-    )
+    marked = scene.model_copy(update={"bookmarks": {"a": {"position": np.zeros(3) + 2}}})
+    assert view_of(marked.bookmarks["a"])[0].position[0] == 2
 
 
 @pytest.mark.parametrize(

@@ -21,11 +21,17 @@ from clfractal.scene.movement import movement_of
 from tests.shell import InProcess, works
 
 START = ["0", "0", "0"]
-END = ["0.3661113824053921475032874780983216", "-0.6581940346532352767992043313105555", "0.38367727753667079744"]
+END = [
+    "0.3661113824053921475032874780983216",
+    "-0.6581940346532352767992043313105555",
+    "0.38367727753667079744",
+]
 DEPTH = 1e12
 
 
-def zoom(frames: int = 24, *, centers: dict[float, Any] | None = None, **tracks: Any) -> Scene:
+def zoom(
+    frames: int = 24, centers: dict[float, Any] | None = None, tracks: dict[str, Any] | None = None
+) -> Scene:
     """A film from the whole set to a place on it; its centre moves as well, unless there are no `centers`."""
     last = frames - 1
     moving = {
@@ -47,7 +53,7 @@ def zoom(frames: int = 24, *, centers: dict[float, Any] | None = None, **tracks:
             "camera": {"position": [1.28, -2.34, 1.38], "target": [0, 0, 0]},
             "image": {"width": 96, "height": 54},
             "renderer": {"type": "surface", "max_steps": 4000},
-            "animation": {"frames": frames, "tracks": {**moving, **tracks}},
+            "animation": {"frames": frames, "tracks": {**moving, **(tracks or {})}},
         }
     )
 
@@ -61,7 +67,7 @@ def test_the_centre_moves_as_the_magnification_lets_it() -> None:
     scene, m1 = zoom(), Fraction(DEPTH)
     movement = movement_of(scene)
     start, end = exact(START), exact(END)
-    # (c - A) m is what it is in scene units; with c = B + (A - B) k, k = (1/m - 1/m1) / (1 - 1/m1), it is constant for this.
+    # With c = B + (A - B) k, k = (1/m - 1/m1) / (1 - 1/m1), this is the point p for which (p - c) m is constant.
     aimed = [b + (a - b) * (-1 / m1) / (1 - 1 / m1) for a, b in zip(start, end, strict=True)]
     seen = []
     for frame in (0, 1, 7.5, 15, 22.9, 23):
@@ -79,8 +85,11 @@ def test_the_centre_moves_as_the_magnification_lets_it() -> None:
 @given(depth=st.integers(-300, 300), digits=st.integers(30, 60), frame=st.floats(0, 10))
 def test_without_a_zoom_it_goes_straight(depth: int, digits: int, frame: float) -> None:
     ends = [f"0.{'1234567890' * 6}"[: digits + 2], f"{abs(depth)}.5e-3", "-0.25"], ["0.5", "0", "-0.25"]
-    track = {"keys": [{"frame": 0, "value": ends[0]}, {"frame": 10, "value": ends[1]}], "interpolation": "linear"}
-    scene = zoom(11, centers={}, **{"deep.center": track, "deep.magnification": {"expression": "1e25"}})
+    track = {
+        "keys": [{"frame": 0, "value": ends[0]}, {"frame": 10, "value": ends[1]}],
+        "interpolation": "linear",
+    }
+    scene = zoom(11, {}, {"deep.center": track, "deep.magnification": {"expression": "1e25"}})
     found = exact(movement_of(scene).values(frame)["deep.center"])
     share = Fraction(frame) / 10
     for one, start, end in zip(found, exact(ends[0]), exact(ends[1]), strict=True):
@@ -116,13 +125,13 @@ def test_keys_keep_all_digits() -> None:
 )
 def test_wrong_centres(track: dict[str, Any], message: str) -> None:
     with pytest.raises(ClfractalError, match=message):
-        zoom(centers={}, **{"deep.center": track})
+        zoom(centers={}, tracks={"deep.center": track})
 
 
 def test_numbers_in_quotes_are_for_centres_alone() -> None:
     keys = [{"frame": 0, "value": ["0", "0", "1"]}]
     with pytest.raises(ClfractalError, match="must be numbers, without quotes"):
-        zoom(**{"camera.target": {"keys": keys}})
+        zoom(tracks={"camera.target": {"keys": keys}})
 
 
 def test_neighbouring_moments_look_alike() -> None:

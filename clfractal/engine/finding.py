@@ -149,8 +149,6 @@ def check_suitable(scene: Scene) -> None:
     if not isinstance(scene.renderer, SurfaceRenderer):
         word = "cut_plane" if isinstance(scene.renderer, CutPlaneRenderer) else "volume"
         raise SceneError(f"views are found of surfaces, got a {word}", Where(path="renderer.type"))
-    if scene.deep is not None:
-        raise SceneError("shows one place; remove it to look for views of the whole set", Where(path="deep"))
     if scene.stereo is not None and scene.stereo.plane is not None:
         raise SceneError(
             "decides where the viewer is; remove it to look for views", Where(path="stereo.plane")

@@ -1,8 +1,8 @@
 """The same picture told from another place: scenes whose camera comes near go over to `deep`, deeper, and back.
 
-A scene's point p is the point c + p / m of the formula's space, c and m being `deep.center` and `deep.magnification`. Told
-from c' and m' it is (p / m + c - c') m', which is made of fractions and rounded once. Cameras are all that is told anew: what
-else has a place or a length in scene units keeps a scene from going over by itself (`why_it_stays`).
+A scene's point p is the point c + p / m of the formula's space, c and m being `deep.center` and `deep.magnification`.
+Told from c' and m' it is (p / m + c - c') m', which is made of fractions and rounded once. Cameras are all that is told
+anew: what else has a place or a length in scene units keeps a scene from going over by itself (`why_it_stays`).
 """
 
 from __future__ import annotations
@@ -77,8 +77,7 @@ def seen_point(point: Exact, deep: Deep | None) -> Vector:
     """Where a scene has a point of the formula's space, rounded once."""
     magnification = Fraction(magnification_of(deep))
     found = (
-        float((each - center) * magnification)
-        for each, center in zip(point, exact_center(deep), strict=True)
+        float((each - center) * magnification) for each, center in zip(point, exact_center(deep), strict=True)
     )
     return cast(Vector, tuple(found))
 

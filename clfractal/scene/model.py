@@ -96,7 +96,10 @@ class Scene(Section):
     animation: Animation | None = Field(
         None, description="values that change from frame to frame of a film; null: a still"
     )
-    bookmarks: Bookmarks = Field({}, description="cameras kept under names, {camera, deep} in a place of any depth; they do not change the picture")
+    bookmarks: Bookmarks = Field(
+        {},
+        description="cameras kept under names, {camera, deep} in a place of any depth; they do not change the picture",
+    )
 
     # Not fields: they are not part of the scene's values, and not compared.
     _folder: Path = PrivateAttr(default_factory=Path)

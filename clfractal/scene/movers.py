@@ -157,8 +157,8 @@ class Movers:
         track = self.animation.tracks[name]
         assert track.keys is not None
         self._check_size(name, "keys.0.value", len(track.keys[0].values))
-        for index, key in enumerate(track.keys):
-            if key.is_exact and self.targets[name].kind != "exact":
+        for index, each in enumerate(track.keys):
+            if each.is_exact and self.targets[name].kind != "exact":
                 raise self._wrong(name, f"keys.{index}.value", "must be numbers, without quotes")
         times = [self.animation.frame_of(key) for key in track.keys]
         values = [key.values for key in track.keys]

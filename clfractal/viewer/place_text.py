@@ -36,4 +36,6 @@ def _without_defaults(scene: Scene) -> dict[str, Any]:
     found: dict[str, Any] = plain(camera)
     fields = type(camera).model_fields
     needed = ("position", "target", "projection")
-    return {key: value for key, value in found.items() if key in needed or value != plain(fields[key].default)}
+    return {
+        key: value for key, value in found.items() if key in needed or value != plain(fields[key].default)
+    }

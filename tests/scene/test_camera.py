@@ -18,6 +18,7 @@ from clfractal.engine.variations import variations
 from clfractal.engine.varied import Kind
 from clfractal.errors import FileError, SceneError
 from clfractal.files.volume_file import Volume, write_volume
+from clfractal.scene.bookmarks import view_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.stance import angles, orbited
@@ -219,7 +220,7 @@ def test_views_and_bookmarks_have_their_own_frames() -> None:
     # Half of the picture is higher than wide, so its camera stands farther away.
     assert found.camera.angles[2] < own.angles[2]
     assert found.views[0][0].camera == own
-    assert found.bookmarks["all"].angles[1:] == pytest.approx((30, found.camera.angles[2]))
+    assert view_of(found.bookmarks["all"])[0].angles[1:] == pytest.approx((30, found.camera.angles[2]))
     assert load_scene(dump_scene(found)) == found
 
 

@@ -19,7 +19,7 @@ from clfractal.scene.model import Scene
 
 NUMBERS = st.floats(-1, 1, allow_nan=False)
 POINTS = st.tuples(NUMBERS, NUMBERS, NUMBERS)
-DIRECTIONS = POINTS.filter(lambda each: 0.1 < math.hypot(each[0], each[1]))
+DIRECTIONS = POINTS.filter(lambda each: math.hypot(each[0], each[1]) > 0.1)
 DEPTHS = st.floats(0, 100).map(lambda exponent: 10.0**exponent)
 EXACT = st.tuples(*3 * (st.fractions(-1, 1, max_denominator=10**40),))
 

@@ -16,6 +16,7 @@ from clfractal.camera import frame
 from clfractal.camera.views import camera_view
 from clfractal.errors import SceneError
 from clfractal.formulas import reference
+from clfractal.scene.bookmarks import view_of
 from clfractal.scene.load import dump_scene, load_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import OrthographicCamera, PerspectiveCamera
@@ -248,7 +249,7 @@ def test_views_bookmarks_and_films_see_too() -> None:
     sphere = 1 / math.sin(math.atan(0.9 * math.tan(math.radians(22.5))))
     assert found.camera.angles[2] == pytest.approx(sphere, rel=0.01)
     assert own.angles[2] > found.camera.angles[2]
-    assert found.bookmarks["above"].angles[1:] == pytest.approx((30, sphere), rel=0.01)
+    assert view_of(found.bookmarks["above"])[0].angles[1:] == pytest.approx((30, sphere), rel=0.01)
     assert load_scene(dump_scene(found)) == found
     film = {"frames": 3, "fps": 1, "tracks": {"camera.orbit.azimuth": {"expression": "40*frame"}}}
     moving = scene({}, formula=UNIT, animation=film)

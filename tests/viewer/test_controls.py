@@ -4,22 +4,15 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 import pytest
 
 from clfractal.camera.views import scene_view
 from clfractal.device.select import Device
-from clfractal.scene.model import Scene
-from clfractal.viewer.aim import aimed
-from clfractal.viewer.controls import ALT, CONTROL, LEFT, MIDDLE, RIGHT, SHIFT, Controls
-from clfractal.viewer.display import CopyTarget, Display, Shown
-from clfractal.viewer.motion import TRANSITION_SECONDS, Motion
-from clfractal.viewer.pacing import Pacing
+from clfractal.viewer.controls import ALT, CONTROL, LEFT, MIDDLE, RIGHT, SHIFT
+from clfractal.viewer.motion import TRANSITION_SECONDS
 from clfractal.viewer.pointer import project
-from clfractal.viewer.settings import Settings
-from clfractal.viewer.studio import Studio
 from tests.viewer.hands import VIEW, Hand
 from tests.viewer.sessions import BALL, scene_of, wait_for
 

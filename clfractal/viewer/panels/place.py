@@ -35,7 +35,9 @@ def _follows(ui: Ui) -> None:
     moves: DeeperMoves | None = ui.memory.get("deeper")
     if moves is None:
         return
-    about = "as many more of them as details that small need; a number that is set by hand counts from then on"
+    about = (
+        "as many more of them as details that small need; a number that is set by hand counts from then on"
+    )
     path = "formula.iterations"
     if w.switch(ui, "Iterations follow", moves.orbits.follow, path=path, name="place.follow", tip=about):
         moves.orbits.switch()
