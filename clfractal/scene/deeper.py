@@ -1,4 +1,4 @@
-"""The same picture told from another place: scenes go over to `deep` as the camera comes near, deeper, and back.
+"""The same picture told from another place: scenes go over to `deep` as the camera comes near, and back.
 
 A scene's point p is the point c + p / m of the formula's space, c and m being `deep.center` and `deep.magnification`.
 Told from c' and m' it is (p / m + c - c') m', which is made of fractions and rounded once. Cameras are all that is told
