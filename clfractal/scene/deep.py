@@ -68,7 +68,7 @@ def check_frames(scene: Any) -> None:
     cameras = [
         ("camera", scene.camera),
         *((f"layout.views.{number}.camera", view.camera) for number, view in enumerate(views)),
-        *((f"bookmarks.{name}", camera) for name, camera in scene.bookmarks.items()),
+        *((f"bookmarks.{name}", getattr(mark, "camera", mark)) for name, mark in scene.bookmarks.items()),
     ]
     for path, camera in cameras:
         if camera is not None and camera.frame == "seen":

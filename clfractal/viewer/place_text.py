@@ -1,4 +1,4 @@
-"""A view as text, to be copied and pasted: the place that a scene shows, with all digits, and the camera there."""
+"""A view as text, to be copied and pasted: the place that a scene shows, with all digits, and its camera."""
 
 from __future__ import annotations
 
