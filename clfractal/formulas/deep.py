@@ -123,6 +123,17 @@ def begun_at(chain: Chain, points: NDArray[np.float64]) -> BegunAt:
     )
 
 
+def applications_until_apart(chain: Chain) -> int:
+    """How many applications it takes until a scene unit around a chain's place is about as large in z as z itself.
+
+    A picture has as much detail at any depth if its iterations are as many more.
+    """
+    place, spread = chain.place, _orbit(chain).spread
+    assert place is not None
+    apart = (n for n, each in enumerate(spread) if math.isfinite(each) and each >= place.magnification)
+    return next(apart, len(spread))
+
+
 def steps_per_pixel(chain: Chain) -> float:
     """How many steps of float64 wide a pixel around a chain's place is in z, at the least.
 
