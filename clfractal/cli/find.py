@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from clfractal.images.framebuffer import Framebuffer
     from clfractal.scene.model import Scene
 
-_OPTIONS = {"count": "--count", "seed": "--seed"}
+_OPTIONS = {"count": "--count", "seed": "--seed", "magnification": "--magnification"}
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -46,6 +46,7 @@ class Choice(Proposals):
     """
 
     seed: int = 0
+    magnification: float | None = None
 
     @property
     def is_scene(self) -> bool:
@@ -74,6 +75,11 @@ def find_views(order: Order, choice: Choice, shell: Shell) -> None:
     choice.check("views", MOST)
     with naming_options(_OPTIONS):
         checked(choice.count, choice.seed)
+    if choice.magnification is not None and choice.is_scene:
+        raise SceneError(
+            f"{choice.output}: bookmarks have cameras, not places; name a folder with -o",
+            Where("--magnification"),
+        )
     with piped(shell, order.scene, ()) as files:
         _find(replace(order, scene=files.source, folder=files.folder), choice, shell)
 
@@ -85,6 +91,11 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
     scene = load_scene(Path(order.scene), overrides=order.overrides, folder=order.folder)
     with speaking_of(order.scene):
         check_suitable(scene)
+        if choice.magnification is not None:
+            from clfractal.engine.deep_finding import checked_magnification  # of few searches
+
+            with naming_options(_OPTIONS):
+                checked_magnification(scene, choice.magnification)
     size = (sized.image.width, sized.image.height) if order.size is not None else small_size(scene)
     moved = Moved(Path(order.scene), scene, choice.folder, "views")
     shell.state = lambda: "clfractal: interrupted; nothing was written"
@@ -95,7 +106,9 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
 
     pictures: list[Pixels] = []
     with choice.folder_made(), Engine(order.device, tell=shell.say) as engine, speaking_of(order.scene):
-        found = found_views(scene, engine, count=choice.count, seed=choice.seed)
+        found = found_views(
+            scene, engine, count=choice.count, seed=choice.seed, magnification=choice.magnification
+        )
 
         def picture(view: FoundView) -> Framebuffer:
             return engine.render(small_scene(view.scene, *size), channels=CHANNELS)

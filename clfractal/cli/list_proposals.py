@@ -73,6 +73,9 @@ def find(
     ] = Path(),
     count: Annotated[int, typer.Option("-n", "--count", help="Number of views.")] = 12,
     seed: Annotated[int, typer.Option("--seed", help="Number that chooses the places that are tried.")] = 0,
+    magnification: Annotated[
+        float | None, typer.Option("--magnification", help="Look for deep places, so many times magnified.")
+    ] = None,
     sheet: _Sheet = None,
     size: _SmallSize = None,
     device: DeviceOption = None,
@@ -85,5 +88,5 @@ def find(
     from clfractal.cli.order import Order
 
     order = Order(scene=scene, device=device, size=size, overrides=tuple(overrides or ()))
-    choice = Choice(output=output, count=count, seed=seed, sheet=sheet)
+    choice = Choice(output=output, count=count, seed=seed, magnification=magnification, sheet=sheet)
     return lambda: find_views(order, choice, context.obj)

@@ -64,7 +64,8 @@ class FoundView:
     Attributes:
         scene: the scene with a camera of its own.
         score: 0 to 1, the higher the more there is to see.
-        room: how far the camera is from the set at least, by the estimate, scene units.
+        room: how far the camera is from the set at least, by the estimate, scene units; of deep places, how far
+            the middle of what is seen is.
         remark: what it shows, in a few words.
     """
 
@@ -99,6 +100,7 @@ def find(
     *,
     count: int = 12,
     seed: int = 0,
+    magnification: float | None = None,
     device: str | Sequence[str] | None = None,
     token: CancelToken | None = None,
 ) -> list[FoundView]:
@@ -112,6 +114,8 @@ def find(
             are floors, on which side of them one is.
         count: how many are wanted; fewer are given if no more differ and show as much.
         seed: chooses the places that are tried.
+        magnification: places that are so many times magnified, 1 to 1e120, in the place of views of the whole: each has a
+            `deep` of its own, a camera and iterations. `room` is then how far the middle of what is seen is.
         device: as of `render`.
         token: ends the search when any thread cancels it; `clfractal.Stopped` is then raised.
 
@@ -123,13 +127,23 @@ def find(
     loaded = as_scene(scene)
     check_token(token)
     with engine_on(device, None) as engine:
-        return found_views(loaded, engine, count=count, seed=seed, token=token)
+        return found_views(loaded, engine, count=count, seed=seed, magnification=magnification, token=token)
 
 
 def found_views(
-    scene: Scene, engine: AnyEngine, *, count: int, seed: int, token: CancelToken | None = None
+    scene: Scene,
+    engine: AnyEngine,
+    *,
+    count: int,
+    seed: int,
+    magnification: float | None = None,
+    token: CancelToken | None = None,
 ) -> list[FoundView]:
     """As `find`, by an engine."""
+    if magnification is not None:
+        from clfractal.engine.deep_finding import deep_views  # of few searches
+
+        return deep_views(scene, engine, magnification=magnification, count=count, seed=seed, token=token)
     count, seed = checked(count, seed)
     check_suitable(scene)
     return _Finder(scene, engine, seed, token).views(count)

@@ -131,18 +131,27 @@ def _evenness(far: Floats) -> float:
     return float(-(shares * np.log(shares)).sum() / np.log(_LAYERS))
 
 
-def _normals(framebuffer: Framebuffer) -> Floats:
-    return np.stack([framebuffer[name] for name in ("N.X", "N.Y", "N.Z")], axis=-1).astype(np.float64)
+def vectors_of(framebuffer: Framebuffer, name: str) -> Floats:
+    """A channel that has an X, a Y and a Z, shape (height, width, 3)."""
+    return np.stack([framebuffer[f"{name}.{axis}"] for axis in "XYZ"], axis=-1).astype(np.float64)
+
+
+def roughness(normals: Floats, reach: int) -> Floats:
+    """How much normals up to some pixels around each one differ: 0 all are one, 1 they cancel out; nothing is (0, 0, 0)."""
+    size, (height, width) = 2 * reach + 1, normals.shape[:2]
+    padded = np.pad(normals, ((reach, reach), (reach, reach), (0, 0)))
+    total = sum(padded[y : y + height, x : x + width] for y in range(size) for x in range(size))
+    return np.asarray(1 - np.linalg.norm(total / size**2, axis=-1))
 
 
 def _turned(framebuffer: Framebuffer, hit: npt.NDArray[np.bool_]) -> float:
-    mean = np.linalg.norm(_normals(framebuffer)[hit].mean(axis=0))
+    mean = np.linalg.norm(vectors_of(framebuffer, "N")[hit].mean(axis=0))
     return min(1.0, float(1 - mean) / _TURNED)
 
 
 def _forms(framebuffer: Framebuffer, hit: npt.NDArray[np.bool_]) -> float:
     """1 for forms that are seen as such: less for grain, and for bare walls without an edge."""
-    normals = _normals(framebuffer)
+    normals = vectors_of(framebuffer, "N")
     cosines = [
         (normals[1:] * normals[:-1]).sum(axis=-1)[hit[1:] & hit[:-1]],
         (normals[:, 1:] * normals[:, :-1]).sum(axis=-1)[hit[:, 1:] & hit[:, :-1]],

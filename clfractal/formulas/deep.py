@@ -147,6 +147,16 @@ def steps_per_pixel(chain: Chain) -> float:
     return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
 
 
+def drawn_out(chain: Chain) -> float:
+    """How many times longer than thick forms around a chain's place are, that are round in z; infinite for sheets.
+
+    Maps that keep angles, folds and inversions and turns, have 1 at any depth. Powers of other algebras than complex
+    numbers draw them out, application by application.
+    """
+    drawn = _orbit(chain).drawn_out
+    return drawn[min(applications_until_apart(chain), len(drawn) - 1)]
+
+
 @dataclass(frozen=True, slots=True)
 class BegunAt:
     """Where orbits of some points begin.
@@ -168,10 +178,12 @@ class _Orbit:
 
     Attributes:
         spread: after 0, 1, ... applications, how much these stretch space, over |z|; an infinity before orbits begin.
+        drawn_out: how much more they stretch it in one direction than in another, likewise; also an infinity for sheets.
     """
 
     begun: tuple[Begun, ...]
     spread: tuple[float, ...]
+    drawn_out: tuple[float, ...]
 
 
 def _orbit(chain: Chain) -> _Orbit:
@@ -203,6 +215,7 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
     first = int(chain.starts_counted)
     begun: list[Begun] = []
     spread: list[float] = []
+    drawn: list[float] = []
     for count in range(most + 1):
         values = tuple(float(each.value) for each in state)
         slopes = np.array([each.slope for each in state])
@@ -214,7 +227,13 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
             reach = min(reach, _straight(state, chain.size), backend.reach)
         if count >= first and reach >= nearest:
             begun.append(Begun(count, values, slopes, growth, reach))
-        stretched = float(np.linalg.norm(slopes[: chain.size], 2)) if np.isfinite(slopes).all() else 0.0
+        widths = (
+            np.linalg.svd(slopes[: chain.size], compute_uv=False)
+            if np.isfinite(slopes).all()
+            else np.zeros(3)
+        )
+        stretched = float(widths[0])
+        drawn.append(stretched / float(widths[2]) if widths[2] > 0 else math.inf)
         spread.append(stretched / max(away, 1.0) if count >= first and stretched > 0 else math.inf)
         bound = chain.link_at(count).bound
         constant = [_jet(each) for each in constant_of(bound, c)]
@@ -223,7 +242,7 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
             found = evaluate(bound.derivative, {**names, "dr": _jet(growth)}, backend)
             growth = float(found.value if isinstance(found, Jet) else found)
         state = [_jet(each) for each in new]
-    return _Orbit(tuple(begun), tuple(spread))
+    return _Orbit(tuple(begun), tuple(spread), tuple(drawn))
 
 
 def _straight(state: Sequence[Jet], size: int) -> float:
