@@ -27,8 +27,8 @@ if TYPE_CHECKING:
     from clfractal.device.cancel import CancelToken as CancelToken
     from clfractal.device.select import devices as devices
     from clfractal.engine.engine import Engine as Engine
-    from clfractal.engine.finding import FoundView as FoundView
     from clfractal.engine.finding import find as find
+    from clfractal.engine.found import FoundView as FoundView
     from clfractal.engine.frames import at_frame as at_frame
     from clfractal.engine.frames import frames as frames
     from clfractal.engine.run import Progress as Progress
@@ -79,7 +79,7 @@ _HOMES = {
     "dump_scene": "clfractal.scene.load",
     "Scene": "clfractal.scene.model",
     "Engine": "clfractal.engine.engine",
-    "FoundView": "clfractal.engine.finding",
+    "FoundView": "clfractal.engine.found",
     "find": "clfractal.engine.finding",
     "at_frame": "clfractal.engine.frames",
     "frames": "clfractal.engine.frames",

@@ -13,7 +13,8 @@ from PIL import Image
 
 import clfractal
 from clfractal.engine import finding
-from clfractal.engine.finding import FoundView, find
+from clfractal.engine.finding import find
+from clfractal.engine.found import FoundView
 from clfractal.engine.view_score import CHANNELS, looked_at
 from clfractal.errors import SceneError
 from clfractal.formulas import reference

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import clfractal
-from clfractal.engine.finding import FoundView, find
+from clfractal.engine.finding import find
+from clfractal.engine.found import FoundView
 from clfractal.errors import SceneError
 from clfractal.formulas import reference
 from clfractal.formulas.deep import drawn_out
@@ -94,7 +95,7 @@ REFUSED = {
     ("--magnification", "1e121"): "--magnification: must be at most 1e+120, got 1e+121",
     ("--magnification", "nan"): "--magnification: must be a finite number",
     ("--magnification", "9", "--set", "deep.magnification=10"): "--magnification: must be at least 10, got 9",
-    ("--magnification", "9", "-o", "views.yaml"): "--magnification: views.yaml: bookmarks have cameras, not places",
+    ("--magnification", "9", "-o", "views.yaml"): "--magnification: views.yaml: bookmarks have no iterations of their own",
     ("--magnification", "9", "--set", "objects.floor.type=plane"): "box.yaml: objects: would stand in the way",
     ("--magnification", "9", "--set", "lights=[]"): "box.yaml: no place was found at a magnification of 9",
 }  # fmt: skip

@@ -22,7 +22,8 @@ from clfractal.cli.proposals import (
 )
 from clfractal.cli.render import ordered_scene
 from clfractal.cli.shell import Shell
-from clfractal.engine.finding import MOST, check_suitable, checked, found_views
+from clfractal.engine.finding import found_views
+from clfractal.engine.found import MOST, check_suitable, checked, checked_magnification
 from clfractal.engine.variations import small_scene
 from clfractal.errors import SceneError, Where, speaking_of
 from clfractal.files.atomic import check_output
@@ -31,7 +32,7 @@ from clfractal.scene.bookmarks import MAX_BOOKMARKS
 from clfractal.scene.load import load_scene
 
 if TYPE_CHECKING:
-    from clfractal.engine.finding import FoundView
+    from clfractal.engine.found import FoundView
     from clfractal.images.framebuffer import Framebuffer
     from clfractal.scene.model import Scene
 
@@ -77,7 +78,7 @@ def find_views(order: Order, choice: Choice, shell: Shell) -> None:
         checked(choice.count, choice.seed)
     if choice.magnification is not None and choice.is_scene:
         raise SceneError(
-            f"{choice.output}: bookmarks have cameras, not places; name a folder with -o",
+            f"{choice.output}: bookmarks have no iterations of their own; name a folder with -o",
             Where("--magnification"),
         )
     with piped(shell, order.scene, ()) as files:
@@ -90,10 +91,8 @@ def _find(order: Order, choice: Choice, shell: Shell) -> None:
     # The scene files keep the scene's own size: the option is for the small pictures.
     scene = load_scene(Path(order.scene), overrides=order.overrides, folder=order.folder)
     with speaking_of(order.scene):
-        check_suitable(scene)
+        check_suitable(scene, deeper=choice.magnification is not None)
         if choice.magnification is not None:
-            from clfractal.engine.deep_finding import checked_magnification  # of few searches
-
             with naming_options(_OPTIONS):
                 checked_magnification(scene, choice.magnification)
     size = (sized.image.width, sized.image.height) if order.size is not None else small_size(scene)

@@ -1,4 +1,4 @@
-"""Deep places of a set that are worth a look: from picture to picture, each a part of the one before, much magnified."""
+"""Deep places of a set that are worth a look: from picture to picture, each a part of the one before."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from clfractal.device.activity import doing
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.any_engine import AnyEngine
-from clfractal.engine.finding import FoundView, check_suitable, checked
+from clfractal.engine.found import FoundView, check_suitable, checked, checked_magnification
 from clfractal.engine.variations import small_scene
 from clfractal.engine.varied import rounded
 from clfractal.engine.view_score import (
@@ -23,11 +23,11 @@ from clfractal.engine.view_score import (
     roughness,
     vectors_of,
 )
-from clfractal.errors import SceneError, Where, arguments
+from clfractal.errors import SceneError
 from clfractal.formulas.deep import applications_until_apart, drawn_out, steps_per_pixel
 from clfractal.images.framebuffer import Framebuffer
 from clfractal.integrators.plan import DEEP_STEPS_PER_PIXEL
-from clfractal.scene.deep import LARGEST_MAGNIFICATION, deep_at, exact_point, magnification_of
+from clfractal.scene.deeper import deep_at, exact_point, magnification_of
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.schema.base import Vector, minus
@@ -91,7 +91,7 @@ def deep_views(
     """
     count, seed = checked(count, seed)
     wanted = checked_magnification(scene, magnification)
-    check_suitable(scene)
+    check_suitable(scene, deeper=True)
     diver = _Diver(scene, engine, wanted, token)
     found: list[FoundView] = []
     for number in range(_DIVES * count):
@@ -106,20 +106,6 @@ def deep_views(
             f"no place was found at a magnification of {wanted:g}: nothing there that is lit, and neither smooth nor dust"
         )
     return sorted(found, key=lambda view: -view.score)
-
-
-def checked_magnification(scene: Scene, magnification: float) -> float:
-    """It as a number; SceneError for what is out of range, or for a scene that is not shown deep."""
-    least = magnification_of(scene.deep)
-    wanted = arguments.number("magnification", magnification, least, LARGEST_MAGNIFICATION)
-    if scene.chain.alone:
-        raise SceneError("has no deep places", Where(path="formula"))
-    for path, there in (("objects", scene.objects), ("cut_planes", scene.cut_planes)):
-        if there:
-            raise SceneError(
-                "would stand in the way of deep places; remove it to look for them", Where(path=path)
-            )
-    return wanted
 
 
 class _Diver:

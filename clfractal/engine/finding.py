@@ -14,25 +14,21 @@ from clfractal.device.activity import doing
 from clfractal.device.cancel import CancelToken
 from clfractal.engine.any_engine import AnyEngine, SceneLike, check_token
 from clfractal.engine.engine import engine_on
+from clfractal.engine.found import FoundView, check_suitable, checked
 from clfractal.engine.variations import small_scene
 from clfractal.engine.varied import rounded
 from clfractal.engine.view_score import CHANNELS, COARSE, Looked, light_of, looked_at
-from clfractal.errors import SceneError, Where, arguments
+from clfractal.errors import SceneError
 from clfractal.images.framebuffer import Framebuffer
-from clfractal.scene.cut_plane import CutPlaneRenderer
 from clfractal.scene.load import as_scene
 from clfractal.scene.model import Scene
 from clfractal.scene.parts import PerspectiveCamera
 from clfractal.scene.seen import Seen
 from clfractal.scene.stance import orbited
-from clfractal.scene.surface import SurfaceRenderer
 from clfractal.schema.base import Vector
 
 Floats = npt.NDArray[np.float64]
 T = TypeVar("T")
-
-MOST = 100
-"""Most views of one call."""
 
 # Points that are drawn for places; places that are tried for each view, at least and at most; directions at each.
 _DRAWN, _PLACES, _DIRECTIONS = 12_000, (12, 48, 144), 6
@@ -55,24 +51,6 @@ _BETTERED, _LEAST_BETTERED, _STEPS = 3, 8, 9
 _LEAST_SCORE, _LEAST_SHARE = 0.12, 0.4
 _SAME, _APART, _TURN = 0.85, 0.25, 50.0
 _CANDIDATES_APART = 0.5
-
-
-@dataclass(frozen=True, slots=True)
-class FoundView:
-    """A view that was found.
-
-    Attributes:
-        scene: the scene with a camera of its own.
-        score: 0 to 1, the higher the more there is to see.
-        room: how far the camera is from the set at least, by the estimate, scene units; of deep places, how far
-            the middle of what is seen is.
-        remark: what it shows, in a few words.
-    """
-
-    scene: Scene
-    score: float
-    room: float
-    remark: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -147,26 +125,6 @@ def found_views(
     count, seed = checked(count, seed)
     check_suitable(scene)
     return _Finder(scene, engine, seed, token).views(count)
-
-
-def checked(count: int, seed: int) -> tuple[int, int]:
-    """Both as numbers; SceneError for what is out of range."""
-    return arguments.whole("count", count, 1, MOST), arguments.whole("seed", seed, 0, 2**63 - 1)
-
-
-def check_suitable(scene: Scene) -> None:
-    """Raises SceneError for a scene of which no views can be looked for."""
-    if scene.layout is not None:
-        raise SceneError("has views of its own; remove it to look for others", Where(path="layout"))
-    if scene.deep is not None:
-        raise SceneError("shows one place of the set; remove it to look for others", Where(path="deep"))
-    if not isinstance(scene.renderer, SurfaceRenderer):
-        word = "cut_plane" if isinstance(scene.renderer, CutPlaneRenderer) else "volume"
-        raise SceneError(f"views are found of surfaces, got a {word}", Where(path="renderer.type"))
-    if scene.stereo is not None and scene.stereo.plane is not None:
-        raise SceneError(
-            "decides where the viewer is; remove it to look for views", Where(path="stereo.plane")
-        )
 
 
 def _told(things: Sequence[T], begin: int, end: int) -> Iterator[T]:
