@@ -244,6 +244,14 @@ class Chain:
         """Applications of one turn of each lasting link."""
         return self.spans[-1].cycle
 
+    def link_index_at(self, application: int) -> int:
+        """The number of the link of an application."""
+        return self._index_at(application)
+
+    def number_counts(self, application: int) -> int:
+        """An application's number, or 0 where its formula is the same for all."""
+        return application if self.link_at(application).bound.formula.numbered else 0
+
     def link_at(self, application: int) -> Link:
         """The link of an application, counted from 0."""
         return self.links[self._index_at(application)]

@@ -119,7 +119,7 @@ class EndsWriter(ABC):
         """The same where a scene shows a place of the formula's space: orbits begin as a table says."""
         over_reals = number_type == "real"
         state = "state" if over_reals else "dual_state"
-        lines = ["const placed at = placed_at(point, placed_table(k), k);"]
+        lines = ["const placed at = placed_begin(point, placed_table(k), k);"]
         for i, axis in enumerate("xyz"):
             near = self.constants.text((0, "center", i))
             coordinate = f"{near} + at.moved.{axis}"
@@ -128,13 +128,13 @@ class EndsWriter(ABC):
             )
         if self.size == 4:
             lines += self._fourth(number_type)
-        lines += [f"z->s{i} = placed_{number_type}(&at, {i}, k);" for i in range(self.size)]
+        for i in range(self.size):
+            lines.append(f"z->s{i} = {_placed_number(i, plain=over_reals)};")
         for place in range(self.room) if over_reals else sorted(self.over_duals):
             plain = self.is_plain(number_type, place)
             lines.append(f"c->e{place} = {'R(0.0)' if plain else 'dual_constant(R(0.0))'};")
-            kind = "real" if plain else "dual"
-            lines.append(f"z->e{place} = placed_{kind}(&at, {self.size + place}, k);")
-        lines += ["c->begun = R(0.0);", "z->begun = placed_count(&at, k);"]
+            lines.append(f"z->e{place} = {_placed_number(self.size + place, plain=plain)};")
+        lines += ["c->begun = R(0.0);", "z->begun = at.begun;"]
         name = "start" if over_reals else "dual_start"
         head = f"INLINE void {name}(vec point, __constant const scalar *k, {state} *c, {state} *z) {{"
         return function_text(head, lines, None)
@@ -142,8 +142,8 @@ class EndsWriter(ABC):
     def start_growth(self) -> str:
         """The scalar derivative where an orbit begins."""
         head = "INLINE real start_growth(vec point, __constant const scalar *k) {"
-        lines = ["const placed at = placed_at(point, placed_table(k), k);"]
-        return function_text(head, lines, "return placed_growth(&at, k);")
+        lines = ["const placed at = placed_begin(point, placed_table(k), k);"]
+        return function_text(head, lines, "return at.growth;")
 
     def placed_table(self) -> str:
         """Where among the constants the table of begun orbits stands."""
@@ -261,6 +261,12 @@ class EndsWriter(ABC):
         self, index: int, number_type: NumberType, *, branches: bool = False, usual: bool = False
     ) -> ScopedEmitter:
         """An emitter for what a link makes of z."""
+
+
+def _placed_number(number: int, *, plain: bool) -> str:
+    """A number of the state where an orbit begins."""
+    z = f"at.z[{number}]"
+    return f"{z}.v" if plain else f"(dual){{{z}.v, {z}.dx, {z}.dy, {z}.dz}}"
 
 
 def parameters_of(bound: BoundFormula) -> dict[str, Value]:

@@ -13,7 +13,14 @@ from clfractal.formulas.costs import OPERATIONS, WORTH_CARRYING, cost_of, count_
 from clfractal.formulas.definition import BoundFormula, point_name
 from clfractal.formulas.emit import Constants, NumberType
 from clfractal.formulas.evaluate import evaluate_constant
-from clfractal.formulas.functions import Facts, each_usual, function_text, link_name, state_functions
+from clfractal.formulas.functions import (
+    Facts,
+    each_usual,
+    function_text,
+    link_name,
+    place_include,
+    state_functions,
+)
 from clfractal.formulas.fuse import fused, needed
 from clfractal.formulas.jacobian import LocalJacobian, local_jacobian
 from clfractal.formulas.names import APPLICATION
@@ -62,8 +69,8 @@ class ChainWriter(EndsWriter):
             self.placed,
         )
         types = state_functions(self.width, self.room, self.over_duals, placed=self.placed)
-        included = ['#include "formulas/place.h"'] if self.placed else []
-        head = [*included, facts.defines() + each_usual(1), types] if self.leaf is None else []
+        included = [place_include(self.width + self.room)] if self.placed else []
+        head = [facts.defines() + each_usual(1), *included, types] if self.leaf is None else []
         return "\n".join([*head, *parts]) + "\n", facts, self.constants
 
     def _numbered(self, index: int) -> bool:

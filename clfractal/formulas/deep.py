@@ -18,7 +18,7 @@ nearer than 2 |p|.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from functools import lru_cache
@@ -31,22 +31,24 @@ from clfractal.errors import FormulaError, Where
 from clfractal.formulas.application import applied, carried_at_start, constant_of, space_to_state
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.evaluate import evaluate
-from clfractal.formulas.jets import Jet, JetBackend, constant_jet, coordinate_jet, full_bend
+from clfractal.formulas.events import STRAIGHT, WIDE, PlaceOrbit, Way, way_past_events
+from clfractal.formulas.jets import Jet, JetBackend, constant_jet, full_bend, variable_jet
+from clfractal.formulas.place import Place
 
-STRAIGHT = 2.0**-20
-"""What linear orbits may be off, as a part of the distance from the place."""
 NEAREST = -40
 """Binary exponent of |p| of the nearest points that are told apart, scene units: some 1e-12 of one."""
 STEP = 2
 """How many of these exponents share an entry of the table (`PLACE_STEP` in `kernels/formulas/place.h`)."""
 FARTHEST = 8
 """How much farther than the set itself the farthest are, as an exponent."""
-HEAD = 6
-"""Numbers before the entries."""
 # Orbits of one place are found anew where it is magnified by so many more bits: films share them in between.
 _SHARED_BITS = 64
 # Digits that values have beyond those of the nearest points.
 _BITS_BESIDE = 80
+# Of a place within the set, whose orbit stays: what is around it comes apart before, or never.
+_MOST_FOLLOWED = 4_000
+# So many times smaller gets what passes near a critical point, and nothing else.
+_COLLAPSE = 1e6
 # No orbit begins where it ends.
 _WITHIN = 0.999
 
@@ -67,84 +69,6 @@ class Begun:
     slopes: NDArray[np.float64]
     growth: float
     reach: float
-
-    def numbers(self) -> Iterator[float]:
-        """An entry of the table: `place.h` has what stands where."""
-        yield float(self.count)
-        yield self.growth
-        for value, slopes in zip(self.state, self.slopes, strict=True):
-            yield value
-            yield from map(float, slopes)
-
-
-def table_of(chain: Chain) -> tuple[float, ...]:
-    """The table of a placed chain as kernels read it: a head of six numbers, its entries, and z of the place's own orbit.
-
-    Raises:
-        FormulaError: mpmath is not there; the path says where.
-    """
-    place = chain.place
-    assert place is not None
-    farthest = math.dist(chain.center, (0.0, 0.0, 0.0)) + chain.radius
-    highest = max(math.ceil(math.log2(max(farthest, 1.0))) + FARTHEST, NEAREST + STEP)
-    begun = begun_orbits(chain)
-    numbers: list[float] = []
-    exponents = range(NEAREST, highest + STEP, STEP)
-    for exponent in exponents:
-        # Points of this entry are nearer than the next one's.
-        most = place.scale * 2.0 ** (exponent + STEP)
-        numbers += (next((each for each in reversed(begun) if each.reach >= most), begun[0])).numbers()
-    width = len(numbers) // len(exponents)
-    head = (2 * NEAREST, len(exponents), width, place.scale, HEAD + len(numbers), begun[0].count)
-    own = (value for each in begun for value in each.state[: chain.size])
-    return (*map(float, head), *numbers, *own)
-
-
-def begun_orbits(chain: Chain) -> tuple[Begun, ...]:
-    """Where orbits around a chain's place may begin, from the first to the last; each is as exact as those before it."""
-    return _orbit(chain).begun
-
-
-def begun_at(chain: Chain, points: NDArray[np.float64]) -> BegunAt:
-    """Where the orbits of points begin, shape (n, 3), scene units: as kernels read the table."""
-    table = np.array(table_of(chain))
-    lowest, count, width, scale = table[:4]
-    square = np.einsum("ij,ij->i", points, points)
-    exponents = np.where(square > 0, np.frexp(square)[1] - 1, lowest)
-    index = np.clip((exponents - lowest) // (2 * STEP), 0, count - 1).astype(int)
-    entries = table[HEAD : HEAD + int(count * width)].reshape(int(count), -1)[index]
-    numbers = entries[:, 2:].reshape(len(points), -1, 4).transpose(1, 2, 0)
-    moved = points.T * scale
-    values = [
-        own + slopes[0] * moved[0] + slopes[1] * moved[1] + slopes[2] * moved[2] for own, *slopes in numbers
-    ]
-    return BegunAt(
-        entries[:, 0].astype(np.int64), values, [[s * scale for s in slopes] for _, *slopes in numbers]
-    )
-
-
-def applications_until_apart(chain: Chain) -> int:
-    """How many applications it takes until a scene unit around a chain's place is about as large in z as z itself.
-
-    A picture has as much detail at any depth if its iterations are as many more.
-    """
-    place, spread = chain.place, _orbit(chain).spread
-    assert place is not None
-    apart = (n for n, each in enumerate(spread) if math.isfinite(each) and each >= place.magnification)
-    return next(apart, len(spread))
-
-
-def steps_per_pixel(chain: Chain) -> float:
-    """How many steps of float64 wide a pixel around a chain's place is in z, at the least.
-
-    Pixels are thousandths of a scene unit. Where orbits begin too soon, at a fold through the place, or pass near a
-    critical point later on, what is seen in the picture is lost.
-    """
-    place, orbit = chain.place, _orbit(chain)
-    assert place is not None
-    begun = next((each for each in reversed(orbit.begun) if each.reach >= place.scale), orbit.begun[0])
-    spread = min(orbit.spread[begun.count :], default=math.inf)
-    return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
 
 
 def drawn_out(chain: Chain) -> float:
@@ -173,7 +97,7 @@ class BegunAt:
 
 
 @dataclass(frozen=True, slots=True)
-class _Orbit:
+class Orbit:
     """What is known of a place's own orbit.
 
     Attributes:
@@ -184,18 +108,112 @@ class _Orbit:
     begun: tuple[Begun, ...]
     spread: tuple[float, ...]
     drawn_out: tuple[float, ...]
+    own: PlaceOrbit
 
 
-def _orbit(chain: Chain) -> _Orbit:
+def reaches_of(chain: Chain) -> list[float]:
+    """How far the points of each entry are at most, in the formula's space: nearer than the next one's."""
     place = chain.place
     assert place is not None
+    farthest = math.dist(chain.center, (0.0, 0.0, 0.0)) + chain.radius
+    highest = max(math.ceil(math.log2(max(farthest, 1.0))) + FARTHEST, NEAREST + STEP)
+    return [place.scale * 2.0 ** (exponent + STEP) for exponent in range(NEAREST, highest + STEP, STEP)]
+
+
+def begin_of(chain: Chain, reach: float) -> Begun:
+    """Where orbits begin that are up to `reach` from a chain's place: the last one that is exact enough there."""
+    begun = begun_orbits(chain)
+    return next((each for each in reversed(begun) if each.reach >= reach), begun[0])
+
+
+def way_of(chain: Chain, begun: Begun, reach: float) -> Way:
+    """The way on from there to where orbits may begin."""
+    off = float(np.linalg.norm(begun.slopes[: chain.size], 2)) * reach
+    if off >= WIDE:
+        return Way((), begun.count)
+    place = chain.place
+    assert place is not None
+    return _way_of(
+        replace(chain, place=None), place.exact, _depth(place), place.applications, begun.count, off, reach
+    )
+
+
+@lru_cache(maxsize=512)
+def _way_of(
+    chain: Chain, center: Sequence[Fraction], depth: int, most: int, begin: int, off: float, reach: float
+) -> Way:
+    import mpmath
+
+    with mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
+        return way_past_events(chain, _found_orbit(chain, center, depth, most).own, begin, off, reach)
+
+
+def begun_orbits(chain: Chain) -> tuple[Begun, ...]:
+    """Where orbits around a chain's place may begin, from the first to the last; each is as exact as those before it."""
+    return orbit_of(chain).begun
+
+
+def begun_at(chain: Chain, points: NDArray[np.float64]) -> BegunAt:
+    """Where the orbits of points begin, shape (n, 3), scene units: as kernels read the table, but before any event."""
+    place = chain.place
+    assert place is not None
+    reaches = reaches_of(chain)
+    square = np.einsum("ij,ij->i", points, points)
+    exponents = np.where(square > 0, np.frexp(square)[1] - 1, 2 * NEAREST)
+    index = np.clip((exponents - 2 * NEAREST) // (2 * STEP), 0, len(reaches) - 1)
+    starts = [begin_of(chain, reach) for reach in reaches]
+    counts = np.array([each.count for each in starts])[index]
+    values = np.array([each.state for each in starts])[index].T
+    slopes = np.array([each.slopes for each in starts])[index].transpose(1, 2, 0) * place.scale
+    return BegunAt(
+        counts,
+        [own + (by * points.T).sum(axis=0) for own, by in zip(values, slopes, strict=True)],
+        list(map(list, slopes)),
+    )
+
+
+def applications_until_apart(chain: Chain) -> int:
+    """How many applications it takes until a scene unit around a chain's place is about as large in z as z itself.
+
+    A picture has as much detail at any depth if its iterations are as many more.
+    """
+    place, spread = chain.place, orbit_of(chain).spread
+    assert place is not None
+    apart = (n for n, each in enumerate(spread) if math.isfinite(each) and each >= place.magnification)
+    return next(apart, len(spread))
+
+
+def steps_per_pixel(chain: Chain) -> float:
+    """How many steps of float64 wide a pixel around a chain's place is in z, at the least.
+
+    Pixels are thousandths of a scene unit. Where orbits begin too soon, at a fold through the place, or pass near a
+    critical point later on, what is seen in the picture is lost.
+    """
+    place, orbit = chain.place, orbit_of(chain)
+    assert place is not None
+    way = way_of(chain, begin_of(chain, place.scale), place.scale)
+    found = [each for each in orbit.spread if math.isfinite(each)]
+    spread = min(orbit.spread[way.count :], default=math.inf)
+    if max(found, default=0.0) * place.scale < 1 and max(found, default=0.0) < _COLLAPSE * spread:
+        return math.inf  # it all goes one way
+    return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
+
+
+def orbit_of(chain: Chain) -> Orbit:
+    """The orbit of a chain's place."""
+    place = chain.place
+    assert place is not None
+    return _found_orbit(replace(chain, place=None), place.exact, _depth(place), place.applications)
+
+
+def _depth(place: Place) -> int:
+    """Bits behind the point of the nearest points that are told apart."""
     depth = math.ceil(math.log2(place.magnification)) - NEAREST
-    depth += -depth % _SHARED_BITS
-    return _orbit_of(replace(chain, place=None), place.exact, depth, place.applications)
+    return depth + -depth % _SHARED_BITS
 
 
 @lru_cache(maxsize=16)
-def _orbit_of(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -> _Orbit:
+def _found_orbit(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -> Orbit:
     try:
         import mpmath
     except ImportError:
@@ -205,9 +223,14 @@ def _orbit_of(chain: Chain, center: Sequence[Fraction], depth: int, most: int) -
         return _follow(chain, point, 2.0**-depth, most)
 
 
-def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _Orbit:
+def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> Orbit:
     backend = JetBackend()
-    c = [_jet(each) for each in space_to_state(chain, list(map(coordinate_jet, center, range(3))), backend)]
+    c = [
+        _jet(each)
+        for each in space_to_state(
+            chain, [variable_jet(value, axis) for axis, value in enumerate(center)], backend
+        )
+    ]
     beside = [_jet(each) for each in carried_at_start(chain, c, backend)]
     state = [_jet(0.0)] * chain.size if chain.add == "point" else list(c)
     state += beside
@@ -216,7 +239,9 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
     begun: list[Begun] = []
     spread: list[float] = []
     drawn: list[float] = []
-    for count in range(most + 1):
+    states: list[tuple[Any, ...]] = []
+    growths: list[float] = []
+    for count in range(min(most, _MOST_FOLLOWED) + 1):
         values = tuple(float(each.value) for each in state)
         slopes = np.array([each.slope for each in state])
         away = math.hypot(*values[: chain.size])
@@ -225,6 +250,8 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
             if not away <= _WITHIN * chain.bailout:
                 break
             reach = min(reach, _straight(state, chain.size), backend.reach)
+        states.append(tuple(each.value for each in state))
+        growths.append(growth)
         if count >= first and reach >= nearest:
             begun.append(Begun(count, values, slopes, growth, reach))
         widths = (
@@ -242,13 +269,14 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> _
             found = evaluate(bound.derivative, {**names, "dr": _jet(growth)}, backend)
             growth = float(found.value if isinstance(found, Jet) else found)
         state = [_jet(each) for each in new]
-    return _Orbit(tuple(begun), tuple(spread), tuple(drawn))
+    own = PlaceOrbit(tuple(c), tuple(states), tuple(growths))
+    return Orbit(tuple(begun), tuple(spread), tuple(drawn), own)
 
 
 def _straight(state: Sequence[Jet], size: int) -> float:
     """How far around the place a state is straight enough."""
     slopes = np.array([each.slope for each in state[:size]])
-    bends = np.array([full_bend(each.bend) for each in state[:size]])
+    bends = np.array([full_bend(each) for each in state[:size]])
     if not (np.isfinite(slopes).all() and np.isfinite(bends).all()):
         return 0.0
     most = float(np.linalg.norm(slopes, 2))
@@ -259,7 +287,7 @@ def _straight(state: Sequence[Jet], size: int) -> float:
     off = float(np.linalg.norm(bends)) / (2 * most)
     found = min(found, STRAIGHT / off) if off > 0 else found
     for each in state[size:]:
-        bend, slope = float(np.linalg.norm(full_bend(each.bend))), float(np.linalg.norm(each.slope))
+        bend, slope = float(np.linalg.norm(full_bend(each))), float(np.linalg.norm(each.slope))
         if bend > 0:
             found = min(found, 2 * STRAIGHT * slope / bend)
     return found

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.fuse import without_unused
+from clfractal.formulas.near_codes import CODES
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,6 +120,12 @@ INLINE vec dual_state_gradient(dual_state z, real factor) {{
     return vec_of({", ".join(each(f"(factor * z.@.v) * z.@.d{axis}", " + ") for axis in "xyz")});
 }}
 """
+
+
+def place_include(width: int) -> str:
+    """What stands before the functions of a formula of whose space a place is shown; `width`: numbers of its state."""
+    codes = "".join(f"#define NEAR_{name.upper()} {number}\n" for number, name in enumerate(CODES))
+    return f'{codes}#define PLACED_WIDTH {width}\n#include "formulas/place.h"'
 
 
 def link_name(prefix: str, index: int, usual: bool) -> str:

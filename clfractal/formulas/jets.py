@@ -1,4 +1,4 @@
-"""Jets over mpmath: a value in any precision, and its first and second derivatives by three coordinates, in float64.
+"""Jets over mpmath: a value in any precision, and its first and second derivatives by some numbers, in float64.
 
 An orbit's values need all digits; how it spreads beside them needs none but the first. The rules are those of Taylor
 arithmetic (Griewank and Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, ch. 13) up to the second order. A backend
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -19,8 +20,6 @@ from clfractal.formulas.backends import MpmathBackend
 from clfractal.formulas.evaluate import MAX_EXPONENT, TINY, power_by_squaring, whole
 
 Parts: TypeAlias = NDArray[np.float64]
-# Of a symmetric matrix the six entries that are kept, and how often each is in it.
-_ROWS, _COLUMNS = np.array([0, 0, 0, 1, 1, 2]), np.array([0, 1, 2, 1, 2, 2])
 _COMPARED = frozenset(("lt", "le", "gt", "ge", "eq", "ne"))
 
 
@@ -30,8 +29,8 @@ class Jet:
 
     Attributes:
         value: an mpf.
-        slope: its three first derivatives.
-        bend: its second ones: xx, xy, xz, yy, yz, zz.
+        slope: its first derivatives.
+        bend: its second ones, those above the matrix's diagonal and on it, row by row.
     """
 
     value: Any
@@ -39,29 +38,38 @@ class Jet:
     bend: Parts
 
 
-def constant_jet(value: Any) -> Jet:
+def constant_jet(value: Any, variables: int = 3) -> Jet:
     """A number that is the same everywhere."""
-    return Jet(value, np.zeros(3), np.zeros(6))
+    return Jet(value, np.zeros(variables), np.zeros(len(_corner(variables)[0])))
 
 
-def coordinate_jet(value: Any, axis: int) -> Jet:
-    """The place's own coordinate."""
-    slope = np.zeros(3)
-    slope[axis] = 1.0
-    return Jet(value, slope, np.zeros(6))
+def variable_jet(value: Any, number: int, *, unit: float = 1.0, variables: int = 3) -> Jet:
+    """One of the variables, of which one unit counts as so much."""
+    jet = constant_jet(value, variables)
+    jet.slope[number] = unit
+    return jet
 
 
-def full_bend(bend: Parts) -> Parts:
-    """The second derivatives as a matrix, shape (3, 3)."""
-    matrix = np.zeros((3, 3))
-    matrix[_ROWS, _COLUMNS] = bend
-    matrix[_COLUMNS, _ROWS] = bend
+def full_bend(jet: Jet) -> Parts:
+    """The second derivatives as a symmetric matrix."""
+    variables = len(jet.slope)
+    rows, columns = _corner(variables)
+    matrix = np.zeros((variables, variables))
+    matrix[rows, columns] = jet.bend
+    matrix[columns, rows] = jet.bend
     return matrix
+
+
+@lru_cache
+def _corner(variables: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    rows, columns = np.triu_indices(variables)
+    return rows, columns
 
 
 def _crossed(a: Any, b: Any) -> Any:
     """a_i b_j + a_j b_i."""
-    return a[_ROWS] * b[_COLUMNS] + a[_COLUMNS] * b[_ROWS]
+    rows, columns = _corner(len(a))
+    return a[rows] * b[columns] + a[columns] * b[rows]
 
 
 class JetBackend:
@@ -71,7 +79,8 @@ class JetBackend:
         reach: how far all went the same way, in units of the coordinates; an infinity where nothing chooses.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, variables: int = 3) -> None:
+        self.variables = variables
         self.plain = MpmathBackend()
         self.reach = math.inf
         self._own: Mapping[str, Callable[..., Any]] = {
@@ -84,7 +93,7 @@ class JetBackend:
             "sign": self._sign,
             "floor": self._floor,
             "mod": lambda a, b: self._own["sub"](
-                a, self._times(b, constant_jet(self._floor(self._over(a, b))))
+                a, self._times(b, self._constant(self._floor(self._over(a, b))))
             ),
             "min": lambda a, b: a if self._ahead(self._own["sub"](b, a)) else b,
             "max": lambda a, b: a if self._ahead(self._own["sub"](a, b)) else b,
@@ -100,16 +109,23 @@ class JetBackend:
         if not any(isinstance(each, Jet) for each in arguments):
             return self.plain.call(function, arguments)
         if function in _COMPARED:
-            a, b = map(_lifted, arguments)
+            a, b = map(self.lifted, arguments)
             difference: Jet = self._own["sub"](a, b)
             self._turns(difference)
             return self.plain.call(function, [a.value, b.value])
         if function in ("pow", "cpow_re", "cpow_im"):
             *base, exponent = arguments
-            return self._own[function](*map(_lifted, base), exponent)
-        jets = [_lifted(each) for each in arguments]
+            return self._own[function](*map(self.lifted, base), exponent)
+        jets = [self.lifted(each) for each in arguments]
         own = self._own.get(function)
         return own(*jets) if own is not None else self._unary(function, jets[0])
+
+    def _constant(self, value: Any) -> Jet:
+        return constant_jet(value, self.variables)
+
+    def lifted(self, value: Any) -> Jet:
+        """A number as a jet."""
+        return value if isinstance(value, Jet) else self._constant(self.plain.mp.mpf(value))
 
     # --- where ways part ---
 
@@ -159,12 +175,12 @@ class JetBackend:
         if function in ("sqrt", "log"):
             self._turns(a)
             if x <= (0.0 if function == "sqrt" else TINY):
-                return constant_jet(value)
+                return self._constant(value)
         if function in ("asin", "acos"):
             for edge in (1, -1):
                 self._turns(Jet(a.value - edge, a.slope, a.bend))
             if abs(x) >= 1:
-                return constant_jet(value)
+                return self._constant(value)
         return self._chain(a, value, *_SLOPES[function](x, y))
 
     def _angle(self, y: Jet, x: Jet) -> Jet:
@@ -173,7 +189,7 @@ class JetBackend:
         w = complex(float(x.value), float(y.value))
         self._around(w, x, y)
         if w == 0:
-            return constant_jet(value)
+            return self._constant(value)
         # (The half line behind 0 is no kink of what orbits make of angles, but of the angle itself.)
         if w.real < 0:
             self._turns(y)
@@ -190,15 +206,15 @@ class JetBackend:
     def _power(self, a: Jet, n: Any) -> Jet:
         exponent = whole(n)
         if exponent is not None and abs(exponent) <= MAX_EXPONENT:
-            power: Jet = power_by_squaring(a, abs(exponent), self._times, constant_jet(self.plain.mp.one))
-            return power if exponent >= 0 else self._over(constant_jet(self.plain.mp.one), power)
+            power: Jet = power_by_squaring(a, abs(exponent), self._times, self._constant(self.plain.mp.one))
+            return power if exponent >= 0 else self._over(self._constant(self.plain.mp.one), power)
         if isinstance(n, Jet):
             return self._unary("exp", self._times(n, self._unary("log", a)))
         value = self.plain.call("pow", [a.value, n])
         self._turns(a)
         x, y, e = float(a.value), float(value), float(n)
         if x <= 0:
-            return constant_jet(value)
+            return self._constant(value)
         return self._chain(a, value, e * y / x, e * (e - 1) * y / x / x)
 
     def _complex_power(self, x: Jet, y: Jet, n: Any) -> tuple[Jet, Jet]:
@@ -217,10 +233,6 @@ class JetBackend:
             first, second = e * f / w, e * (e - 1) * f / w / w
         slope, bend = first * slope, first * bend + second / 2 * _crossed(slope, slope)
         return Jet(re, slope.real, bend.real), Jet(im, slope.imag, bend.imag)
-
-
-def _lifted(value: Any) -> Jet:
-    return value if isinstance(value, Jet) else constant_jet(value)
 
 
 # f' and f'' of functions of one number, by it and by f.

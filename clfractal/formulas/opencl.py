@@ -100,7 +100,7 @@ class _Written:
         if chain.turns_are_data:
             constants += map(float, chain.table[0])
         if chain.place is not None:
-            from clfractal.formulas.deep import table_of  # which asks for many digits
+            from clfractal.formulas.deep_table import table_of  # which asks for many digits
 
             constants += table_of(chain)
         return FormulaText(self.text, tuple(constants) or (0.0,), self.facts.of(chain))
