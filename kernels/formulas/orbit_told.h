@@ -18,7 +18,7 @@ INLINE real trap_distance(trap near, state z) {
 
 // How near z comes to the trap before an orbit begins: all are where the place's own is. Where it begins counts, too, unless that is at its
 // point, before any application.
-#ifdef PLACED
+#ifdef SHOWS_PLACE
 INLINE real told_before(trap near, state z, orbit_record orbit, constants k) {
     const int table = placed_table(k), own = table + (int)k[table + 4], first = (int)k[table + 5];
     const real none = (real)(REAL_LARGEST);

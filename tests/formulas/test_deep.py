@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clfractal.formulas.deep import NEAREST, STEP, STRAIGHT, Begun, begun_orbits, table_of
+from clfractal.formulas.deep import NEAREST, STEP, STRAIGHT, Begun, begun_orbits
+from clfractal.formulas.deep_table import HEAD, table_of
 from clfractal.formulas.reference import mp_orbit
 from tests.deep_truth import (
     MORE_DIGITS,
@@ -81,8 +82,10 @@ def test_states_of_a_place_are_its_own(name: str, depth: int) -> None:
 @pytest.mark.parametrize("name", PLACES)
 def test_entries_of_the_table_are_those_that_reach_far_enough(name: str) -> None:
     chain = placed(name, 20, PLACES[name]["iterations"][20])
-    lowest, count, width, unit, *numbers = table_of(chain)
-    assert (lowest, unit) == (2 * NEAREST, 1e-20)
+    table = table_of(chain)
+    lowest, count, width, unit, own, first = table[:HEAD]
+    assert (lowest, unit, first) == (2 * NEAREST, 1e-20, begun_orbits(chain)[0].count)
+    numbers = table[HEAD + 4 * chain.size : int(own)]
     assert len(numbers) == count * width
     reaches = {each.count: each.reach for each in begun_orbits(chain)}
     counts = [numbers[int(width) * index] for index in range(int(count))]

@@ -13,7 +13,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from clfractal.formulas.backends import MpmathBackend
-from clfractal.formulas.jets import Jet, JetBackend, constant_jet, coordinate_jet, full_bend
+from clfractal.formulas.jets import Jet, JetBackend, constant_jet, full_bend, variable_jet
 from clfractal.formulas.nodes import ARITHMETIC, COMPARISONS, FUNCTIONS, LOGIC
 
 DIGITS = 90
@@ -30,7 +30,7 @@ _SLOPES = st.lists(st.lists(_NEAR, min_size=9, max_size=9), min_size=3, max_size
 def quadratic(numbers: Sequence[float], point: Sequence[Any]) -> Any:
     """A value with slopes and bends at 0: a + b p + p C p / 2, of ten numbers."""
     terms = [mpmath.mpf(numbers[0]), *(b * p for b, p in zip(numbers[1:4], point, strict=True))]
-    bend = full_bend(np.array(numbers[4:]))
+    bend = full_bend(jet(numbers))
     terms += [bend[i, j] * point[i] * point[j] / 2 for i in range(3) for j in range(3)]
     return mpmath.fsum(terms)
 
@@ -80,7 +80,7 @@ def test_every_function_has_its_derivatives(function: str) -> None:
         scale = 1 + float(np.abs(bend).max()) + float(np.abs(slope).max())
         assert lifted.value == exact
         np.testing.assert_allclose(lifted.slope, slope, rtol=1e-9, atol=1e-10 * scale)
-        np.testing.assert_allclose(full_bend(lifted.bend), bend, rtol=1e-9, atol=1e-10 * scale)
+        np.testing.assert_allclose(full_bend(lifted), bend, rtol=1e-9, atol=1e-10 * scale)
 
     compare()
 
@@ -89,7 +89,7 @@ def test_every_function_has_its_derivatives(function: str) -> None:
 def test_conditions_are_those_of_values_and_bound_the_reach(function: str) -> None:
     with mpmath.workdps(DIGITS):
         jets = JetBackend()
-        a, b = coordinate_jet(mpmath.mpf("0.5"), 0), constant_jet(mpmath.mpf("0.25"))
+        a, b = variable_jet(mpmath.mpf("0.5"), 0), constant_jet(mpmath.mpf("0.25"))
         assert jets.call(function, [a, b]) is MpmathBackend().call(function, [a.value, b.value])
     assert jets.reach == pytest.approx(0.125)  # half of how far the other way lies
 
@@ -115,7 +115,7 @@ def test_where_ways_part_bounds_the_reach(function: str, others: list[float], ed
     inner = 1e-30 * (1 if edge <= 0 else -1)
     with mpmath.workdps(DIGITS):
         jets = JetBackend()
-        jets.call(function, [coordinate_jet(mpmath.mpf(edge) + mpmath.mpf(inner), 1), *others])
+        jets.call(function, [variable_jet(mpmath.mpf(edge) + mpmath.mpf(inner), 1), *others])
     assert jets.reach == pytest.approx(abs(inner) / 2, rel=1e-9)
 
 
@@ -129,7 +129,7 @@ def test_what_varies_nowhere_is_no_jet() -> None:
 def test_whole_powers_and_their_products_reach_everywhere() -> None:
     with mpmath.workdps(DIGITS):
         jets = JetBackend()
-        x = coordinate_jet(mpmath.mpf("0.3"), 0)
+        x = variable_jet(mpmath.mpf("0.3"), 0)
         jets.call("pow", [x, 5])
         jets.call("cpow_re", [x, x, 8])
         jets.call("mul", [x, x])
