@@ -18,6 +18,7 @@ nearer than 2 |p|.
 from __future__ import annotations
 
 import math
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
@@ -49,6 +50,8 @@ _BITS_BESIDE = 80
 _MOST_FOLLOWED = 4_000
 # So many times smaller gets what passes near a critical point, and nothing else.
 _COLLAPSE = 1e6
+# mpmath has one precision for all threads.
+_EXACT = threading.RLock()
 # No orbit begins where it ends.
 _WITHIN = 0.999
 
@@ -144,7 +147,7 @@ def _way_of(
 ) -> Way:
     import mpmath
 
-    with mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
+    with _EXACT, mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
         return way_past_events(chain, _found_orbit(chain, center, depth, most).own, begin, off, reach)
 
 
@@ -218,7 +221,7 @@ def _found_orbit(chain: Chain, center: Sequence[Fraction], depth: int, most: int
         import mpmath
     except ImportError:
         raise FormulaError("needs mpmath: pip install 'clfractal[deep]'", Where(path="deep")) from None
-    with mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
+    with _EXACT, mpmath.workprec(depth + _BITS_BESIDE), np.errstate(all="ignore"):
         point = [mpmath.mpf(part.numerator) / part.denominator for part in center]
         return _follow(chain, point, 2.0**-depth, most)
 
