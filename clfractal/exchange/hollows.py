@@ -1,4 +1,4 @@
-"""Where their distances make other surfaces than the set has: views from within, and sets of few applications.
+"""Where their distances make other surfaces than the set has: views from within, sets of few applications.
 
 Theirs find surfaces where their estimate of a distance ends, whether or not orbits escape. Elsewhere that is where the set
 is, which our distances, of the map's own derivative, lead to.
