@@ -1,4 +1,4 @@
-"""Pictures on the surfaces of a settings file, as maps of a material: colours, reliefs and light of one's own.
+"""Pictures on surfaces of a settings file, as maps of a material: colours, reliefs and light of one's own.
 
 Of the ways in which theirs lay pictures on a surface ours have the one from three sides (cubic), and only along paths.
 """

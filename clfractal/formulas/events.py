@@ -1,4 +1,4 @@
-"""The way of orbits past events: applications at which a map is not straight over all that is seen of a place.
+"""The way of orbits past events: applications where a map is not straight over all that is seen of a place.
 
 A fold may pass through the picture at the first applications, or the place's orbit near a critical point at a late one.
 There the application is done operation by operation (`recorder.py`); before, between and behind them the map is

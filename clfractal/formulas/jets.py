@@ -1,4 +1,4 @@
-"""Jets over mpmath: a value in any precision, and its first and second derivatives by some numbers, in float64.
+"""Jets over mpmath: values in any precision, with first and second derivatives by some numbers, in float64.
 
 An orbit's values need all digits; how it spreads beside them needs none but the first. The rules are those of Taylor
 arithmetic (Griewank and Walther, Evaluating Derivatives, 2nd ed., SIAM 2008, ch. 13) up to the second order. A backend

@@ -1,4 +1,4 @@
-"""Where a scene's space lies in that of its formula: a place of any depth, told exactly, and how much it is magnified."""
+"""Where a scene's space lies in its formula's: a place of any depth, and how much it is magnified."""
 
 from __future__ import annotations
 

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from clfractal.formulas.deep import NEAREST, STEP, STRAIGHT, Begun, begun_orbits
+from clfractal.formulas.deep import NEAREST, STEP, Begun, begun_orbits
 from clfractal.formulas.deep_table import HEAD, table_of
+from clfractal.formulas.events import STRAIGHT
 from clfractal.formulas.reference import mp_orbit
 from tests.deep_truth import (
     MORE_DIGITS,
