@@ -74,16 +74,6 @@ class Begun:
     reach: float
 
 
-def drawn_out(chain: Chain) -> float:
-    """How many times longer than thick forms around a chain's place are, that are round in z; infinite for sheets.
-
-    Maps that keep angles, folds and inversions and turns, have 1 at any depth. Powers of other algebras than complex
-    numbers draw them out, application by application.
-    """
-    drawn = _orbit(chain).drawn_out
-    return drawn[min(applications_until_apart(chain), len(drawn) - 1)]
-
-
 @dataclass(frozen=True, slots=True)
 class BegunAt:
     """Where orbits of some points begin.
@@ -184,6 +174,16 @@ def applications_until_apart(chain: Chain) -> int:
     assert place is not None
     apart = (n for n, each in enumerate(spread) if math.isfinite(each) and each >= place.magnification)
     return next(apart, len(spread))
+
+
+def drawn_out(chain: Chain) -> float:
+    """How many times longer than thick forms around a chain's place are, that are round in z; infinite for sheets.
+
+    Maps that keep angles, folds and inversions and turns, have 1 at any depth. Powers of other algebras than complex
+    numbers draw them out, application by application.
+    """
+    drawn = orbit_of(chain).drawn_out
+    return drawn[min(applications_until_apart(chain), len(drawn) - 1)]
 
 
 def steps_per_pixel(chain: Chain) -> float:
