@@ -55,6 +55,9 @@ def write_formula(
     Writing takes milliseconds, so texts are kept: for other parameter values only the constants are computed.
     """
     chain = chain.as_written
+    if chain.place is not None and chain.degree > 1:
+        # A rule of one number takes the map for one that keeps angles. After as many applications it does not.
+        scalar_rule = False
     asked = _Asked((chain.structure, chain.facts), chain)
     return _written(asked, scalar_rule, dual_map, leaf).filled(chain)
 

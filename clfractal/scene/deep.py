@@ -11,11 +11,14 @@ from pydantic import BeforeValidator, Field, WithJsonSchema
 from clfractal.formulas.place import Place
 from clfractal.schema.base import Section, problem
 from clfractal.schema.fields import EXACT, SCALE
+from clfractal.schema.shape import Ball
 
 MOST_DIGITS = 1000
 """Of a coordinate."""
 LARGEST = 1e6
 """Of coordinates; that of other positions of a scene, too."""
+REACH = 1e6
+"""How far around the picture the set is looked for, in times of its own radius."""
 LARGEST_MAGNIFICATION = 1e120
 """Squares of distances to the whole set, and of derivatives, are numbers of float64."""
 _DECIMAL = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d{1,4})?")
@@ -54,6 +57,14 @@ class Deep(Section):
     magnification: Annotated[
         float, Field(strict=True, ge=1, le=LARGEST_MAGNIFICATION, allow_inf_nan=False), SCALE
     ] = Field(1.0, description="how many times larger it is shown")
+
+    def searched(self, ball: Ball, radius: float) -> Ball:
+        """The part of the set's ball that rays search, scene units; `radius`: the set's own.
+
+        Far beyond the picture, structures of all larger sizes would shut out every light of the scene, and rays would pass
+        through those that are too thin for their steps.
+        """
+        return ball if ball[1] <= REACH * radius else ((0.0, 0.0, 0.0), REACH * radius)
 
     def place(self, applications: int) -> Place:
         """The place, as formulas know it; orbits have at most so many applications."""

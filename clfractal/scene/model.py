@@ -5,7 +5,6 @@ Right-handed space, z up, scene units; angles in degrees; colours linear Rec. 70
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from functools import reduce
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, Self, TypeVar, cast
 
@@ -28,16 +27,17 @@ from clfractal.scene.materials import Materials
 from clfractal.scene.mist import Mist
 from clfractal.scene.moved_cameras import with_words
 from clfractal.scene.named_files import grid_files, light_files, texture_files
-from clfractal.scene.objects import FormulaObject, Objects, VolumeObject, ball_around, ball_of_both
+from clfractal.scene.objects import FormulaObject, Objects, ball_around
 from clfractal.scene.parts import AnyCamera, Background, Camera, Image, Material, Output
 from clfractal.scene.reads import Reads, is_data, is_table, section_of
 from clfractal.scene.renderer import Renderer
+from clfractal.scene.set_ball import ball_of_grid, ball_of_set
 from clfractal.scene.stance import Extent, Framed
 from clfractal.scene.stereo import Stereo
 from clfractal.scene.surface import SurfaceRenderer
 from clfractal.scene.volume import VolumeRenderer
 from clfractal.schema.base import Section, Vector, own_errors
-from clfractal.schema.shape import Ball, Joined, Solid
+from clfractal.schema.shape import Joined
 
 if TYPE_CHECKING:
     from clfractal.formulas.language import Chain
@@ -196,15 +196,12 @@ class Scene(Section):
         Of objects alone it is the ball around those that have an end.
         """
         if not self.has_set:
-            return ball_around(self.objects.values(), lambda each: _ball_of_grid(each, self.grids[each.file]))
-        balls = [] if self.chain.alone else [(self.chain.center, self.chain.radius)]
-        for name, part in self.joined.items():
-            if isinstance(part, FormulaObject) and part.join in ("union", "smooth_union"):
-                chain = self.joined_chains[name]
-                balls.append(part.ball(chain.center, chain.radius))
-            elif isinstance(part, Solid) and part.join in ("union", "smooth_union"):
-                balls.append(part.ball)
-        return reduce(ball_of_both, balls or [(self.chain.center, self.chain.radius)])
+            return ball_around(self.objects.values(), lambda each: ball_of_grid(each, self.grids[each.file]))
+        chain = self.chain
+        own = (chain.center, chain.radius)
+        if self.deep is not None:
+            own = self.deep.searched(own, chain.own_radius)
+        return ball_of_set(own, self.joined, self.joined_chains, alone=chain.alone)
 
     @property
     def joined(self) -> "Mapping[str, Joined]":
@@ -496,13 +493,6 @@ class Scene(Section):
         if self.animation is not None:
             with_words(plain, self, self.animation.tracks)
         return plain
-
-
-def _ball_of_grid(each: VolumeObject, grid: "GivenGrid") -> Ball:
-    from clfractal.scene.object_grids import placed
-
-    extent = placed(each, grid).place.extent
-    return extent.center, extent.radius
 
 
 class _Reads(Reads):
