@@ -4,9 +4,9 @@ import re
 from collections.abc import Mapping
 from typing import Annotated, Any, Literal, TypeAlias
 
-from pydantic import Discriminator, Field, Tag
+from pydantic import Discriminator, Field, Tag, WithJsonSchema
 
-from clfractal.scene.deep import LARGEST_MAGNIFICATION, ExactPosition
+from clfractal.scene.deep import DECIMAL_SCHEMA, LARGEST_MAGNIFICATION, ExactPosition
 from clfractal.schema.base import Number, Section, chosen_by_list, problem, rule
 from clfractal.schema.hex_color import AlsoAs
 
@@ -25,6 +25,16 @@ Magnitude = Annotated[
 ]
 
 
+# At least one of them is text.
+_EXACT = {
+    "type": "array",
+    "prefixItems": [DECIMAL_SCHEMA] * 3,
+    "minItems": 3,
+    "maxItems": 3,
+    "contains": {"type": "string"},
+}
+
+
 def _shape(value: Any) -> str:
     if not isinstance(value, (list, tuple)):
         return "one"
@@ -38,7 +48,7 @@ Value = Annotated[
         Field(strict=False, min_length=2, max_length=16),
         Tag("several"),
     ]
-    | Annotated[ExactPosition, Tag("exact")],
+    | Annotated[ExactPosition, Tag("exact"), WithJsonSchema(_EXACT)],
     Discriminator(_shape),
 ]
 Texts = Annotated[

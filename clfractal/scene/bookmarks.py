@@ -16,8 +16,8 @@ class DeepView(Section):
     """A camera in a place that is shown magnified."""
 
     tag = "placed"
-    camera: Camera
-    deep: Deep
+    camera: Camera = Field(description="as it stands there, scene units")
+    deep: Deep = Field(description="the place")
 
 
 Bookmark: TypeAlias = AnyCamera | DeepView

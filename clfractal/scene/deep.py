@@ -37,8 +37,8 @@ def _decimal(value: Any) -> str:
     return text
 
 
-_SCHEMA = {"anyOf": [{"type": "number", "minimum": -LARGEST, "maximum": LARGEST}, {"type": "string"}]}
-Decimal = Annotated[str, BeforeValidator(_decimal), WithJsonSchema(_SCHEMA, mode="validation")]
+DECIMAL_SCHEMA = {"anyOf": [{"type": "number", "minimum": -LARGEST, "maximum": LARGEST}, {"type": "string"}]}
+Decimal = Annotated[str, BeforeValidator(_decimal), WithJsonSchema(DECIMAL_SCHEMA, mode="validation")]
 """A number of any number of digits; in YAML in quotes, where it has more than 17."""
 ExactPosition = Annotated[tuple[Decimal, Decimal, Decimal], Field(strict=False)]
 

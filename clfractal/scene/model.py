@@ -67,10 +67,10 @@ class Scene(Section):
 
     version: Literal[1] = Field(description="version of this schema")
     formula: Formula
+    camera: Camera
     deep: Deep | None = Field(
         None, description="a place of the formula's space that is shown magnified; null: the space itself"
     )
-    camera: Camera
     # Defaults are data, checked when used: an instance here would build its model on import.
     image: Image = Field(default_factory=dict, validate_default=True)
     renderer: Renderer = Field(default_factory=dict, validate_default=True)

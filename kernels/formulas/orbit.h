@@ -12,6 +12,21 @@
 
 #include "formulas/orbit_types.h"
 
+// Where a scene shows a place of a formula's space, magnified, orbits begin at counts of their own, and wait for them (place.h).
+// ORBIT_FIRST: the first application of those of some lanes. HAS_BEGUN: which of them wait no longer. START_GROWTH: the scalar derivative
+// where they begin. IN_SCENE: from a change in the formula's space to one in the scene's.
+#ifdef SHOWS_PLACE
+#define ORBIT_FIRST(z, lanes) placed_first((z).begun, lanes)
+#define HAS_BEGUN(z) equal((z).begun, R(0.0))
+#define START_GROWTH(point) start_growth(point, k)
+#define IN_SCENE(change) ((change) * (real)(orbit->unit))
+#else
+#define ORBIT_FIRST(z, lanes) FIRST_COUNT
+#define HAS_BEGUN(z) equal(R(0.0), R(0.0))
+#define START_GROWTH(point) R(1.0)
+#define IN_SCENE(change) (change)
+#endif
+
 // Whether a shape, or a distance that a formula tells itself, says what is inside; where |z| grows by powers, the bailout does.
 #define ENDS_BY_SHAPE (HAS_SHAPE && !LOGARITHMIC)
 // Whether numbers go on beside z: equal z need not have equal futures then.

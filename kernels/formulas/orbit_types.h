@@ -2,21 +2,6 @@
 // (solids.h); else a formula by itself, of which nothing is known that is told of the nearest of several.
 #include "formulas/numbers/quick.h"
 
-// Where a scene shows a place of a formula's space, magnified, orbits begin at counts of their own, and wait for them (place.h).
-// ORBIT_FIRST: the first application of those of some lanes. HAS_BEGUN: which of them wait no longer. START_GROWTH: the scalar derivative
-// where they begin. IN_SCENE: from a change in the formula's space to one in the scene's.
-#ifdef SHOWS_PLACE
-#define ORBIT_FIRST(z, lanes) placed_first((z).begun, lanes)
-#define HAS_BEGUN(z) equal((z).begun, R(0.0))
-#define START_GROWTH(point) start_growth(point, k)
-#define IN_SCENE(change) ((change) * (real)(orbit->unit))
-#else
-#define ORBIT_FIRST(z, lanes) FIRST_COUNT
-#define HAS_BEGUN(z) equal(R(0.0), R(0.0))
-#define START_GROWTH(point) R(1.0)
-#define IN_SCENE(change) (change)
-#endif
-
 // Does something for each number of a state.
 #if STATE_SIZE == 4
 #define STATE_EACH(DO) DO(s0) DO(s1) DO(s2) DO(s3)

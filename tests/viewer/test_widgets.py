@@ -37,6 +37,7 @@ def test_every_field_of_every_section_is_understood() -> None:
         "background",
         "cut_planes",
         "bookmarks",
+        "center",
         "materials",
         "blend",
         "curve",
