@@ -87,7 +87,9 @@ def test_every_operation_beside_a_place(name: str) -> None:
     assert (found.inside == exact.inside).all()
     outside = ~exact.inside
     np.testing.assert_allclose(found.full[outside], exact.full[outside] * magnification, rtol=1e-5)
-    np.testing.assert_allclose(found.step[outside], exact.step[outside] * magnification, rtol=1e-5)
+    # (Of powers rays march by the Jacobian there.)
+    step = exact.step if chain.degree <= 1 else exact.full
+    np.testing.assert_allclose(found.step[outside], step[outside] * magnification, rtol=1e-5)
     np.testing.assert_allclose(found.smooth[outside], exact.smooth[outside], atol=1e-5)
 
 
