@@ -104,6 +104,7 @@ def test_rendering_a_surface_loads_nothing_of_other_pictures(tmp_path: Path) -> 
     own = {
         *("clfractal.device.buildlog", "clfractal.images.anaglyph", "clfractal.images.probe"),
         *("clfractal.integrators.volume", "clfractal.integrators.cut_plane", "clfractal.voxels"),
+        *("clfractal.exchange.look", "clfractal.formulas.deep", "clfractal.scene.deeper"),
         *("clfractal.schema.error_texts", "clfractal.scene.palette", "clfractal.stereo.eyes"),
         *(
             "clfractal.engine.comfort",

@@ -7,7 +7,6 @@ from pathlib import Path
 
 from clfractal.cli.shell import Shell
 from clfractal.errors import ClfractalError, FileError, Where, unknown_name
-from clfractal.exchange.look import LOOKS
 from clfractal.files.atomic import atomic_writer, check_output
 from clfractal.files.file_kinds import OF_OTHERS, kind_of
 from clfractal.files.inputs import refuse_overwriting
@@ -31,6 +30,7 @@ def import_scene(
     """
     # Here, as other commands do not need it.
     from clfractal.exchange.kinds import import_file
+    from clfractal.exchange.look import LOOKS
     from clfractal.scene.load import load_scene
     from clfractal.scene.named_files import rename_files
     from clfractal.viewer.named import carried, data_files

@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from fractions import Fraction
 from itertools import count, islice
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,8 +31,10 @@ from clfractal.formulas.backends import (
 )
 from clfractal.formulas.carried import names_at_end
 from clfractal.formulas.chain import Chain
-from clfractal.formulas.deep import begun_at
 from clfractal.formulas.evaluate import Backend, evaluate, evaluate_constant
+
+if TYPE_CHECKING:
+    from clfractal.formulas.deep import BegunAt
 
 __all__ = [
     "DualBackend",
@@ -168,7 +170,7 @@ def start(chain: Chain, points: Float, backend: Backend) -> tuple[list[Float], l
     raw = space_to_state(chain, _in_formula(chain, list(columns), backend, float), backend)
     point = [np.array(np.broadcast_to(p, columns[0].shape), dtype=float) for p in raw]
     if chain.place is not None:
-        return begun_at(chain, points).values, point
+        return _begun_at(chain, points).values, point
     state = [np.zeros_like(p) if chain.add == "point" else p.copy() for p in point]
     beside = carried_at_start(chain, point, backend)
     state += [np.array(np.broadcast_to(each, columns[0].shape), dtype=float) for each in beside]
@@ -191,7 +193,13 @@ def _in_formula(
 
 def _begun(chain: Chain, points: Float) -> NDArray[np.int64]:
     """The applications at which orbits begin; those of a place shown magnified together with all that is around it."""
-    return np.zeros(len(points), np.int64) if chain.place is None else begun_at(chain, points).counts
+    return np.zeros(len(points), np.int64) if chain.place is None else _begun_at(chain, points).counts
+
+
+def _begun_at(chain: Chain, points: Float) -> BegunAt:
+    from clfractal.formulas.deep import begun_at  # which few scenes need
+
+    return begun_at(chain, points)
 
 
 def _norm(state: Sequence[Float]) -> Float:
@@ -216,7 +224,7 @@ def _dual_orbit(
     state += [_full(each, shape) for each in carried_at_start(chain, point, backend)]
     begun = _begun(chain, columns.T)
     if chain.place is not None:
-        found = begun_at(chain, columns.T)
+        found = _begun_at(chain, columns.T)
         state = [Dual(value, tuple(slopes)) for value, slopes in zip(found.values, found.slopes, strict=True)]
     size = chain.size
     count = np.zeros(shape, dtype=np.int64)

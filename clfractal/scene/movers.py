@@ -25,7 +25,6 @@ from clfractal.scene.curves import (
 )
 from clfractal.scene.flight import Around, Distance, EvenTarget
 from clfractal.scene.model import Scene
-from clfractal.scene.moved_place import MovedPlace
 from clfractal.scene.reads import TABLE
 from clfractal.scene.tracks import Target, is_camera_place
 
@@ -291,6 +290,8 @@ class Movers:
         """The centre of a place of any depth."""
         times, _, _ = self._keys(name)
         keys = self.animation.tracks[name].keys or ()
+        from clfractal.scene.moved_place import MovedPlace  # which few films need
+
         texts = [key.texts for key in keys]
         texts += texts[:1] if len(times) > len(texts) else []  # the ring's first key once more
         magnified = self.names.get((*self.targets[name].path[:-1], "magnification"))
