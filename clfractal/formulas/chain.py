@@ -135,7 +135,7 @@ class Chain:
     @cached_property
     def first_index(self) -> int:
         """The number of the link of application 0."""
-        return self._index_at(0)
+        return self.index_at(0)
 
     @property
     def first(self) -> BoundFormula:
@@ -236,7 +236,7 @@ class Chain:
         """The links of applications 0, 1, ..., and how many of them at the end come again and again."""
         last = self.spans[-1]
         cycles = max(-(-(USUAL_TABLE - last.begin) // last.cycle), 1)
-        one = [self._index_at(n) for n in range(last.begin + last.cycle)]
+        one = [self.index_at(n) for n in range(last.begin + last.cycle)]
         return (*one, *(one[last.begin :] * (cycles - 1))), last.cycle
 
     @property
@@ -244,19 +244,16 @@ class Chain:
         """Applications of one turn of each lasting link."""
         return self.spans[-1].cycle
 
-    def link_index_at(self, application: int) -> int:
-        """The number of the link of an application."""
-        return self._index_at(application)
-
     def number_counts(self, application: int) -> int:
         """An application's number, or 0 where its formula is the same for all."""
         return application if self.link_at(application).bound.formula.numbered else 0
 
     def link_at(self, application: int) -> Link:
         """The link of an application, counted from 0."""
-        return self.links[self._index_at(application)]
+        return self.links[self.index_at(application)]
 
-    def _index_at(self, application: int) -> int:
+    def index_at(self, application: int) -> int:
+        """The number of the link of an application, counted from 0."""
         span = next(span for span in self.spans if span.end is None or application < span.end)
         place = span.place(application)
         for index in self.turn_order:

@@ -32,16 +32,16 @@ from clfractal.errors import FormulaError, Where
 from clfractal.formulas.application import applied, carried_at_start, constant_of, space_to_state
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.evaluate import evaluate
-from clfractal.formulas.events import STRAIGHT, WIDE, PlaceOrbit, Way, way_past_events
-from clfractal.formulas.jets import Jet, JetBackend, constant_jet, full_bend, variable_jet
+from clfractal.formulas.events import STRAIGHT, WIDE, PlaceOrbit, Way, spread_and_bend, way_past_events
+from clfractal.formulas.jets import Jet, JetBackend, constant_jet, variable_jet
 from clfractal.formulas.place import Place
 
 NEAREST = -40
 """Binary exponent of |p| of the nearest points that are told apart, scene units: some 1e-12 of one."""
 STEP = 2
 """How many of these exponents share an entry of the table (`PLACE_STEP` in `kernels/formulas/place.h`)."""
-FARTHEST = 8
-"""How much farther than the set itself the farthest are, as an exponent."""
+FARTHEST = 26
+"""That of the farthest points that are told apart: rays and cameras get no farther. Those beyond begin where all may."""
 # Orbits of one place are found anew where it is magnified by so many more bits: films share them in between.
 _SHARED_BITS = 64
 # Digits that values have beyond those of the nearest points.
@@ -108,9 +108,8 @@ def reaches_of(chain: Chain) -> list[float]:
     """How far the points of each entry are at most, in the formula's space: nearer than the next one's."""
     place = chain.place
     assert place is not None
-    farthest = math.dist(chain.center, (0.0, 0.0, 0.0)) + chain.radius
-    highest = max(math.ceil(math.log2(max(farthest, 1.0))) + FARTHEST, NEAREST + STEP)
-    return [place.scale * 2.0 ** (exponent + STEP) for exponent in range(NEAREST, highest + STEP, STEP)]
+    told_apart = [place.scale * 2.0 ** (exponent + STEP) for exponent in range(NEAREST, FARTHEST, STEP)]
+    return [*told_apart, math.inf]
 
 
 def begin_of(chain: Chain, reach: float) -> Begun:
@@ -119,10 +118,21 @@ def begin_of(chain: Chain, reach: float) -> Begun:
     return next((each for each in reversed(begun) if each.reach >= reach), begun[0])
 
 
-def way_of(chain: Chain, begun: Begun, reach: float) -> Way:
-    """The way on from there to where orbits may begin."""
-    off = float(np.linalg.norm(begun.slopes[: chain.size], 2)) * reach
-    if off >= WIDE:
+def begins_too_soon(chain: Chain, reach: float) -> bool:
+    """Whether what is as far from the place is too narrow in z where orbits begin."""
+    return _off(chain, begin_of(chain, reach), reach) < WIDE
+
+
+def _off(chain: Chain, begun: Begun, reach: float) -> float:
+    """How far points are from the place at most in z, where their orbits begin."""
+    return float(np.linalg.norm(begun.slopes[: chain.size], 2)) * reach
+
+
+def way_of(chain: Chain, reach: float) -> Way:
+    """The way of points up to `reach` from the place, from where their orbits begin to where that is soon enough."""
+    begun = begin_of(chain, reach)
+    off = _off(chain, begun, reach)
+    if not off < WIDE:
         return Way((), begun.count)
     place = chain.place
     assert place is not None
@@ -194,10 +204,9 @@ def steps_per_pixel(chain: Chain) -> float:
     """
     place, orbit = chain.place, orbit_of(chain)
     assert place is not None
-    way = way_of(chain, begin_of(chain, place.scale), place.scale)
-    found = [each for each in orbit.spread if math.isfinite(each)]
-    spread = min(orbit.spread[way.count :], default=math.inf)
-    if max(found, default=0.0) * place.scale < 1 and max(found, default=0.0) < _COLLAPSE * spread:
+    spread = min(orbit.spread[way_of(chain, place.scale).count :], default=math.inf)
+    most = max((each for each in orbit.spread if math.isfinite(each)), default=0.0)
+    if most * place.scale < 1 and most < _COLLAPSE * spread:
         return math.inf  # it all goes one way
     return spread * place.scale / 1000 / float(np.finfo(np.float64).eps)
 
@@ -278,21 +287,16 @@ def _follow(chain: Chain, center: Sequence[Any], nearest: float, most: int) -> O
 
 def _straight(state: Sequence[Jet], size: int) -> float:
     """How far around the place a state is straight enough."""
-    slopes = np.array([each.slope for each in state[:size]])
-    bends = np.array([full_bend(each) for each in state[:size]])
-    if not (np.isfinite(slopes).all() and np.isfinite(bends).all()):
-        return 0.0
-    most = float(np.linalg.norm(slopes, 2))
-    if most == 0:
+    spread, bend = spread_and_bend(state[:size])
+    if not 0 < spread < math.inf:
         return 0.0
     # (Where second derivatives vanish by chance, those behind them are small over a small part of z.)
-    found = STRAIGHT / most
-    off = float(np.linalg.norm(bends)) / (2 * most)
-    found = min(found, STRAIGHT / off) if off > 0 else found
+    found = STRAIGHT / spread
+    found = min(found, STRAIGHT * spread / bend) if bend > 0 else found
     for each in state[size:]:
-        bend, slope = float(np.linalg.norm(full_bend(each))), float(np.linalg.norm(each.slope))
+        spread, bend = spread_and_bend([each])
         if bend > 0:
-            found = min(found, 2 * STRAIGHT * slope / bend)
+            found = min(found, STRAIGHT * spread / bend)
     return found
 
 

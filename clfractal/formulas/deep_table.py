@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from clfractal.formulas.chain import Chain
-from clfractal.formulas.deep import NEAREST, STEP, Begun, begin_of, orbit_of, reaches_of, way_of
+from clfractal.formulas.deep import (
+    NEAREST,
+    STEP,
+    Begun,
+    begin_of,
+    begins_too_soon,
+    orbit_of,
+    reaches_of,
+    way_of,
+)
 from clfractal.formulas.events import Event, Way
 from clfractal.formulas.near_codes import CODES
 from clfractal.formulas.recorder import Program
@@ -44,17 +53,18 @@ def table_of(chain: Chain) -> tuple[float, ...]:
 def _together(number: int, count: int) -> int:
     """The entry whose events are those of an entry."""
     number = max(number, (_FINEST - NEAREST) // STEP)
-    return min(number // _TOGETHER * _TOGETHER + _TOGETHER, count) - 1
+    # (The last one is of all that is beyond.)
+    return min(number // _TOGETHER * _TOGETHER + _TOGETHER, max(count - 1, number + 1)) - 1
 
 
 def _way_on(chain: Chain, reach: float, most: float) -> tuple[Begun, Way]:
     """Where orbits begin that are up to `reach` from the place, and their way on, which is good up to `most`."""
+    if begins_too_soon(chain, reach):
+        way = way_of(chain, most)
+        if way.events:
+            return begin_of(chain, most), way
     begun = begin_of(chain, reach)
-    if not way_of(chain, begun, reach).events:
-        return begun, Way((), begun.count)
-    shared = begin_of(chain, most)
-    way = way_of(chain, shared, most)
-    return (shared, way) if way.events else (begun, Way((), begun.count))
+    return begun, Way((), begun.count)
 
 
 class _Lists:
@@ -64,7 +74,8 @@ class _Lists:
         self.begin = begin
         self.numbers: list[float] = []
         self._programs: dict[Program, int] = {}
-        self._ways: dict[int, int] = {}
+        # (Equal ways are one object.)
+        self._ways: dict[int, tuple[Way, int]] = {}
 
     def place(self, way: Way) -> int:
         """Where the list of a way stands; 0 for one without events, or where there is no room for it."""
@@ -80,8 +91,8 @@ class _Lists:
             for event in way.events:
                 if event.program not in self._programs:
                     self._programs[event.program] = self._append(_program(event.program))
-            self._ways[id(way)] = self._append(self._way(way))
-        return self._ways[id(way)]
+            self._ways[id(way)] = way, self._append(self._way(way))
+        return self._ways[id(way)][1]
 
     def _append(self, numbers: Iterator[float]) -> int:
         at = self.begin + len(self.numbers)

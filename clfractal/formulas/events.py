@@ -81,7 +81,7 @@ def way_past_events(chain: Chain, orbit: PlaceOrbit, begin: int, off: float, rea
     events: list[Event] = []
     count, last, first = begin, len(orbit.states) - 1, off
     while off < WIDE and count < last and len(events) < MOST_EVENTS:
-        program = program_of(chain, chain.link_index_at(count), chain.number_counts(count))
+        program = program_of(chain, chain.index_at(count), chain.number_counts(count))
         if max(program.slots) >= MOST_SLOTS:
             break
         inputs = [*orbit.states[count], *(each.value for each in orbit.c), orbit.growths[count]]
@@ -113,7 +113,7 @@ def _straight_way(
     count, slopes = begin, np.array([each.slope for each in state])
     while count + 1 < len(orbit.states):
         state = _next(chain, orbit, count, state, c, backend)
-        spread, bend = _spread_and_bend(state[: chain.size])
+        spread, bend = spread_and_bend(state[: chain.size])
         if not (backend.reach >= 1 and bend <= STRAIGHT * spread and spread <= STRAIGHT):
             break
         count += 1
@@ -125,7 +125,7 @@ def _behind(chain: Chain, orbit: PlaceOrbit, count: int, off: float, reach: floa
     """How far points are from the place in z at most behind the application `count`."""
     backend = JetBackend(chain.size + len(chain.carried) + 3)
     state, c = _seeds(orbit, count, off), _constants(orbit, reach, backend.variables)
-    return sum(_spread_and_bend(_next(chain, orbit, count, state, c, backend)[: chain.size]))
+    return sum(spread_and_bend(_next(chain, orbit, count, state, c, backend)[: chain.size]))
 
 
 def _seeds(orbit: PlaceOrbit, count: int, off: float) -> list[Jet]:
@@ -156,7 +156,8 @@ def _next(
     return [backend.lifted(each) for each in new]
 
 
-def _spread_and_bend(state: Sequence[Jet]) -> tuple[float, float]:
+def spread_and_bend(state: Sequence[Jet]) -> tuple[float, float]:
+    """How much a state changes at most over a unit of the variables, and how much of that is not straight."""
     slopes = np.array([each.slope for each in state])
     bends = np.array([full_bend(each) for each in state])
     if not (np.isfinite(slopes).all() and np.isfinite(bends).all()):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from clfractal.formulas.chain import Chain
 from clfractal.formulas.fuse import without_unused
-from clfractal.formulas.near_codes import CODES
+from clfractal.formulas.near_codes import CODES, MOST_SLOTS
 
 
 @dataclass(frozen=True, slots=True)
@@ -125,7 +125,9 @@ INLINE vec dual_state_gradient(dual_state z, real factor) {{
 def place_include(width: int) -> str:
     """What stands before the functions of a formula of whose space a place is shown; `width`: numbers of its state."""
     codes = "".join(f"#define NEAR_{name.upper()} {number}\n" for number, name in enumerate(CODES))
-    return f'{codes}#define PLACED_WIDTH {width}\n#include "formulas/place.h"'
+    return (
+        f'{codes}#define NEAR_SLOTS {MOST_SLOTS}\n#define PLACED_WIDTH {width}\n#include "formulas/place.h"'
+    )
 
 
 def link_name(prefix: str, index: int, usual: bool) -> str:

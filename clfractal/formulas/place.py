@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from functools import cached_property
@@ -38,7 +39,7 @@ class Place:
         x, y, z = map(float, self.exact)
         return x, y, z
 
-    def seen(self, point: tuple[float, float, float]) -> tuple[float, float, float]:
+    def seen(self, point: Sequence[float | Fraction]) -> tuple[float, float, float]:
         """A point of the formula's space in the scene, rounded once."""
         factor = Fraction(self.magnification)
         x, y, z = (float((Fraction(a) - b) * factor) for a, b in zip(point, self.exact, strict=True))

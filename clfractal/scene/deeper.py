@@ -75,11 +75,7 @@ def exact_point(point: Vector, deep: Deep | None) -> Exact:
 
 def seen_point(point: Exact, deep: Deep | None) -> Vector:
     """Where a scene has a point of the formula's space, rounded once."""
-    magnification = Fraction(magnification_of(deep))
-    found = (
-        float((each - center) * magnification) for each, center in zip(point, exact_center(deep), strict=True)
-    )
-    return cast(Vector, tuple(found))
+    return cast(Vector, tuple(map(float, point))) if deep is None else deep.place(0).seen(point)
 
 
 def told_anew(point: Vector, before: Deep | None, after: Deep | None) -> Vector:

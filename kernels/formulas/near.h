@@ -8,8 +8,7 @@ typedef struct {
     real dx, dy, dz;  // how it changes with the point
 } near;
 
-#define NEAR_SLOTS 40       // MOST_SLOTS
-#define NEAR_OPERATION 6    // numbers of an operation: where it goes, its code, its operands, its constant
+#define NEAR_OPERATION 6  // numbers of an operation: where it goes, its code, its operands, its constant
 
 // What a smooth function gives: its slope halfway between both, and at the point. (Differences are small here.)
 INLINE near near_smooth(real own, near a, real between, real slope) {

@@ -11,7 +11,7 @@ import pytest
 
 from clfractal.formulas import catalog, events
 from clfractal.formulas.chain import Chain
-from clfractal.formulas.deep import begin_of, steps_per_pixel, way_of
+from clfractal.formulas.deep import steps_per_pixel, way_of
 from clfractal.formulas.deep_table import table_of
 from clfractal.formulas.opencl import forget_texts
 from clfractal.formulas.place import Place
@@ -71,7 +71,7 @@ def test_every_operation_beside_a_place(name: str) -> None:
     # So small a picture that many applications are events, and one that float64 resolves without a place.
     magnification, iterations = 1e9, 12
     chain = placed(name, tuple(map(repr, NEAR)), magnification, iterations, **FORMULAS[name])  # type: ignore[arg-type]
-    assert way_of(chain, begin_of(chain, chain.place.scale), chain.place.scale).events  # type: ignore[union-attr]
+    assert way_of(chain, chain.place.scale).events  # type: ignore[union-attr]
     points = np.random.default_rng(5).uniform(-1, 1, (256, 3))
     lanes = 8
     found = distances(chain, points, iterations, device=device(), lanes=lanes, precision="float64")
@@ -109,11 +109,11 @@ def test_folds_through_the_corner_of_a_sponge(magnification: float, iterations: 
 
 def test_tables_fit_in_the_memory_for_constants() -> None:
     chain = placed("menger_sponge", ("1", "1", "1"), 1e60, 140)
-    assert way_of(chain, begin_of(chain, 1e-60), 1e-60).events
+    assert way_of(chain, 1e-60).events
     assert len(table_of(chain)) * 8 < 61_000
 
 
 def test_a_cycle_that_attracts_has_no_events() -> None:
     """Around the middle of a bulb space shrinks: no way leads to where orbits part."""
     chain = placed("quaternion_mandelbrot", ("-1", "0", "0"), 1e12, 100)
-    assert not way_of(chain, begin_of(chain, 1e-12), 1e-12).events
+    assert not way_of(chain, 1e-12).events
